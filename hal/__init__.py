@@ -1,0 +1,1 @@
+"""The contract between a robot and whatever drives it: messages, topics, bus, governor, profiles."""

@@ -1,0 +1,246 @@
+"""The values that cross modules. They mirror the ROS 2 messages of the same name and keep their field names.
+
+Frames and units: REP-103 (SI units, x forward, y left, yaw counter-clockwise) and REP-105; ranges after REP-117
+(+inf: no return, -inf: too close, nan: bad). Every `stamp_s` is a capture or decision time on the robot's clock.
+"""
+
+from dataclasses import dataclass, field
+from enum import StrEnum
+
+import numpy as np
+from numpy.typing import NDArray
+
+FloatArray = NDArray[np.float32]
+ByteArray = NDArray[np.uint8]
+
+
+@dataclass(frozen=True, slots=True)
+class Twist:
+    """Planar velocity of base_link (geometry_msgs/Twist: linear.x, angular.z)."""
+
+    linear_m_s: float
+    angular_rad_s: float
+
+
+STOP = Twist(0.0, 0.0)
+
+
+class Source(StrEnum):
+    """Who a command comes from, or who drives."""
+
+    NONE = "none"
+    POLICY = "policy"
+    TELEOP = "teleop"
+
+
+class Reason(StrEnum):
+    """Why the wheels get what they get."""
+
+    OK = "ok"
+    NO_COMMAND = "no_command"  # nothing has been commanded yet
+    STALE = "stale"  # the newest command is older than its time-out
+    NEUTRAL_FIRST = "neutral_first"  # stopped or just started: a neutral command has to come first
+    REFUSED = "refused"  # the newest command was refused (non-finite, out of order)
+
+
+@dataclass(frozen=True, slots=True)
+class Command:
+    """A wish to move, in SI units.
+
+    `stamp_s` is when it was decided, `answers` the sequence number of the observation it answers (-1: none).
+    """
+
+    twist: Twist
+    stamp_s: float
+    source: Source = Source.POLICY
+    answers: int = -1
+
+
+@dataclass(frozen=True, slots=True)
+class Applied:
+    """What the base really got, from whom, and why (`cmd_vel/applied`)."""
+
+    twist: Twist
+    stamp_s: float
+    source: Source = Source.NONE
+    reason: Reason = Reason.NO_COMMAND
+    clamps: tuple[str, ...] = ()
+    answers: int = -1
+    command_age_s: float = float("nan")
+
+
+@dataclass(frozen=True, slots=True)
+class LaserScan:
+    """sensor_msgs/LaserScan. `ranges`: float32 [n], counter-clockwise from `angle_min`, metres, REP-117."""
+
+    stamp_s: float
+    angle_min: float
+    angle_increment: float
+    range_min: float
+    range_max: float
+    ranges: FloatArray
+    scan_time: float = 0.0
+    time_increment: float = 0.0
+
+
+@dataclass(frozen=True, slots=True)
+class Image:
+    """sensor_msgs/Image. `data`: uint8 [height, width, 3] for rgb8, [height, width] for mono8."""
+
+    stamp_s: float
+    data: ByteArray
+    encoding: str = "rgb8"
+
+
+@dataclass(frozen=True, slots=True)
+class CompressedImage:
+    """sensor_msgs/CompressedImage. `format` is "jpeg" or "png"."""
+
+    stamp_s: float
+    data: bytes
+    format: str = "jpeg"
+
+
+@dataclass(frozen=True, slots=True)
+class Odometry:
+    """nav_msgs/Odometry in the plane: pose in `odom`, velocity in `base_link`."""
+
+    stamp_s: float
+    x_m: float
+    y_m: float
+    yaw_rad: float
+    linear_m_s: float
+    angular_rad_s: float
+
+
+@dataclass(frozen=True, slots=True)
+class Imu:
+    """sensor_msgs/Imu: yaw, yaw rate and the two planar accelerations."""
+
+    stamp_s: float
+    yaw_rad: float
+    angular_rad_s: float
+    linear_m_s2: float
+    lateral_m_s2: float
+
+
+@dataclass(frozen=True, slots=True)
+class Range:
+    """sensor_msgs/Range of one infrared ranger, REP-117."""
+
+    stamp_s: float
+    frame_id: str
+    range_m: float
+    min_range_m: float
+    max_range_m: float
+
+
+@dataclass(frozen=True, slots=True)
+class BatteryState:
+    """sensor_msgs/BatteryState: the CORE2 measures the voltage only."""
+
+    stamp_s: float
+    voltage_v: float
+
+
+@dataclass(frozen=True, slots=True)
+class Observation:
+    """The newest of every sensor at `stamp_s`; a sensor that is absent or stale is None.
+
+    `seq` numbers observations; a command names the one it answers.
+    """
+
+    seq: int
+    stamp_s: float
+    scan: LaserScan | None = None
+    image: Image | CompressedImage | None = None
+    odom: Odometry | None = None
+    imu: Imu | None = None
+    battery: BatteryState | None = None
+    ranges: tuple[Range, ...] = field(default=())
+
+
+@dataclass(frozen=True, slots=True)
+class CourseState:
+    """Ground truth about the drive that only a twin knows. For teachers, referees and plots, never for policies.
+
+    `progress_m` runs along the course and grows over laps; `lateral_m` is the signed distance from it, left positive
+    (both nan where a world has no line). `collided`, `lost` and `finished` hold for the present episode and latch.
+    """
+
+    stamp_s: float
+    x_m: float
+    y_m: float
+    yaw_rad: float
+    linear_m_s: float
+    angular_rad_s: float
+    progress_m: float
+    lateral_m: float
+    clearance_m: float
+    collided: bool = False
+    lost: bool = False
+    finished: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class Episode:
+    """A fresh start in a twin's world.
+
+    `layout` seeds everything random in the world; `start_m` is where on the course the robot is put down
+    (0: the world's own start), `lateral_m` and `yaw_rad` how far off it, relative to the course.
+    """
+
+    layout: int = 0
+    start_m: float = 0.0
+    lateral_m: float = 0.0
+    yaw_rad: float = 0.0
+
+
+Action = tuple[float, float]
+"""A normalised command (linear, angular), each in [-1, 1]: a fraction of the profile's limits."""
+
+
+@dataclass(frozen=True, slots=True)
+class ExpertView:
+    """One expert at one decision: its action, its activation A^i (eq. 1) and whether that made it active."""
+
+    name: str
+    action: Action
+    activation: float
+    active: bool
+
+
+@dataclass(frozen=True, slots=True)
+class LabelCounts:
+    """Labels by source; `given` is before the redundancy filter, `stored` after it."""
+
+    given_human: int = 0
+    given_expert: int = 0
+    stored_human: int = 0
+    stored_expert: int = 0
+    demonstration: int = 0  # the human's labels before the first training step, counted apart
+
+
+@dataclass(frozen=True, slots=True)
+class Decision:
+    """What was decided on one observation, by whom and why (`lira/decision`).
+
+    `driver` is "human", "novice", "mean" or an expert's name; `call` is "none", "attention" or "feedback".
+    `executed` is what drove, before any slow-down; `phase` and `lap` say where in a session this step belongs.
+    """
+
+    stamp_s: float
+    observation: int
+    driver: str
+    call: str
+    executed: Action
+    novice: Action
+    human: Action | None
+    experts: tuple[ExpertView, ...]
+    threshold: float
+    labels: LabelCounts
+    training_steps: int
+    interventions: int
+    calls: int  # rising edges of attention and feedback calls
+    phase: str = "train"
+    lap: int = 0

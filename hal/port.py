@@ -1,0 +1,46 @@
+"""The port that every robot fits: physical, twin, remote, null. The code that drives one drives them all."""
+
+from typing import Protocol
+
+from hal.messages import Applied, Command, CourseState, Episode, Observation
+from hal.profile import RobotProfile
+
+
+class Robot(Protocol):
+    """A differential-drive robot with a lidar and a camera.
+
+    The clock belongs to the robot: `now` and every stamp are on it, and `wait` is the only way to let time pass.
+    On a physical robot that is the monotonic clock; a twin in lockstep or a replay owns its time.
+    """
+
+    @property
+    def profile(self) -> RobotProfile:
+        """Geometry, limits and sensors."""
+
+    def open(self) -> None:
+        """Bring the devices up. Raises `DeviceError` or `BusError` with the remedy."""
+
+    def read(self) -> Observation:
+        """Return the newest of every sensor with its capture time; what is absent or stale is None."""
+
+    def drive(self, command: Command) -> Applied:
+        """Ask for a velocity and return what the base really got. Never blocks on a sensor."""
+
+    def now(self) -> float:
+        """Seconds on the robot's clock."""
+
+    def wait(self, until_s: float) -> None:
+        """Let the robot's time pass until `until_s`; at once if that has passed."""
+
+    def close(self) -> None:
+        """Stop the wheels, then let go of the devices. May be called twice."""
+
+
+class Arena(Protocol):
+    """What a twin can do and a floor cannot: start afresh, and tell where the robot really is."""
+
+    def reset(self, episode: Episode) -> None:
+        """Put the robot down anew. The next `read` belongs to the new episode."""
+
+    def state(self) -> CourseState:
+        """Ground truth now."""

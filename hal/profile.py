@@ -1,0 +1,158 @@
+"""Robot profiles: geometry, limits and sensors of one robot as data.
+
+`thesis-sim` is the simulated robot of the thesis, `rosbot2` the Husarion ROSbot 2.0; a user's own is a TOML file.
+"""
+
+from importlib import resources
+from pathlib import Path
+from typing import Annotated, Literal
+
+import msgspec
+from msgspec import Meta
+
+from hal.config import Table, load_toml
+from hal.errors import ConfigError
+
+Positive = Annotated[float, Meta(gt=0.0)]
+NotNegative = Annotated[float, Meta(ge=0.0)]
+Count = Annotated[int, Meta(ge=1)]
+Angle = Annotated[float, Meta(gt=0.0, le=6.2832)]
+
+# Law 1: the wheels get zero no later than this after the last valid command.
+STOP_BUDGET_S = 0.3
+
+
+class Base(Table):
+    """The body and its drive. `drive`: "kinematic" moves exactly as told, "wheels" has dynamics."""
+
+    drive: Literal["kinematic", "wheels"]
+    length_m: Positive
+    width_m: Positive
+    height_m: Positive
+    wheel_radius_m: Positive
+    track_m: Positive
+    max_linear_m_s: Positive
+    max_angular_rad_s: Positive
+    acceleration_m_s2: Positive  # the firmware's ramp, "wheels" only
+
+
+class Lidar(Table):
+    """A planar scanner at (x, z) from base_link's projection on the floor, `beams` over `fov_rad` centred ahead.
+
+    A full turn (`fov_rad` 2 pi) has beams at fov/beams spacing, a sector includes both of its ends.
+    """
+
+    x_m: float
+    z_m: Positive
+    beams: Count
+    fov_rad: Angle
+    range_min_m: NotNegative
+    range_max_m: Positive
+    rate_hz: Positive
+    noise_m: NotNegative = 0.0  # standard deviation of a range
+    dropout: Annotated[float, Meta(ge=0.0, le=1.0)] = 0.0  # share of beams that read nan
+
+
+class Camera(Table):
+    """A pinhole camera at (x, z), pitched down by `pitch_rad`. `encoding` is how it travels."""
+
+    x_m: float
+    z_m: Positive
+    pitch_rad: float
+    width_px: Count
+    height_px: Count
+    hfov_rad: Angle
+    vfov_rad: Angle
+    rate_hz: Positive
+    encoding: Literal["jpeg", "png"]
+    noise_gray: NotNegative = 0.0  # standard deviation of a pixel, of 255
+
+
+class Features(Table):
+    """What the networks see: `bins` ranges over `fov_rad` ahead, clipped at `max_range_m`; a square gray image.
+
+    `filters` is the width f of the camera trunk (16 simulated, 32 real).
+    """
+
+    fov_rad: Angle
+    bins: Count
+    max_range_m: Positive
+    image_px: Count
+    filters: Count
+
+
+class Control(Table):
+    """Rates and time-outs. A command drives for `policy_timeout_s` or `teleop_timeout_s` after it was decided."""
+
+    rate_hz: Positive
+    policy_timeout_s: Positive
+    teleop_timeout_s: Positive
+
+
+class RobotProfile(Table):
+    """Everything that differs between robots, validated when it loads."""
+
+    name: str
+    description: str
+    base: Base
+    lidar: Lidar
+    camera: Camera
+    features: Features
+    control: Control
+
+    def __post_init__(self) -> None:
+        """Check what no single key can: raises `ValueError`, which loading turns into a `ConfigError`."""
+        for key in ("policy_timeout_s", "teleop_timeout_s"):
+            value = getattr(self.control, key)
+            if value >= STOP_BUDGET_S:
+                raise ValueError(
+                    f"control.{key} = {value} must be below the stop budget of {STOP_BUDGET_S} s"
+                )
+        if self.features.fov_rad > self.lidar.fov_rad + 1e-6:
+            raise ValueError(
+                f"features.fov_rad = {self.features.fov_rad} is wider than lidar.fov_rad = {self.lidar.fov_rad}"
+            )
+        if self.features.max_range_m > self.lidar.range_max_m:
+            raise ValueError(
+                f"features.max_range_m = {self.features.max_range_m} is beyond "
+                f"lidar.range_max_m = {self.lidar.range_max_m}"
+            )
+
+    @property
+    def period_s(self) -> float:
+        """Time between two decisions."""
+        return 1.0 / self.control.rate_hz
+
+    def to_json(self) -> bytes:
+        """Encode for the bus; `profile_from_json` reads it back."""
+        return msgspec.json.encode(self)
+
+
+def profile_from_json(data: bytes) -> RobotProfile:
+    """Decode what `RobotProfile.to_json` wrote. Raises `ConfigError`."""
+    try:
+        return msgspec.json.decode(data, type=RobotProfile)
+    except (msgspec.MsgspecError, ValueError) as error:
+        raise ConfigError(
+            f"the robot sent a profile that does not load: {error}", "Run one version on both sides."
+        ) from error
+
+
+def known_profiles() -> list[str]:
+    """Names of the profiles that come with the project."""
+    folder = resources.files("hal") / "profiles"
+    return sorted(
+        entry.name.removesuffix(".toml") for entry in folder.iterdir() if entry.name.endswith(".toml")
+    )
+
+
+def load_profile(name_or_path: str) -> RobotProfile:
+    """Load a profile by name, or a user's own by the path of its TOML file. Raises `ConfigError`."""
+    if name_or_path.endswith(".toml"):
+        return load_toml(Path(name_or_path), RobotProfile)
+    if name_or_path not in known_profiles():
+        raise ConfigError(
+            f"unknown profile '{name_or_path}'",
+            f"Known profiles: {', '.join(known_profiles())}; or give the path of a .toml file.",
+        )
+    return load_toml(Path(str(resources.files("hal") / "profiles" / f"{name_or_path}.toml")), RobotProfile)

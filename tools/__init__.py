@@ -1,0 +1,1 @@
+"""What a person runs: the `lira` command and its verbs."""
