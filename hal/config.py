@@ -23,9 +23,7 @@ def load_toml(path: Path, kind: type[T]) -> T:
     try:
         text = path.read_text(encoding="utf-8")
     except (OSError, UnicodeDecodeError) as error:
-        raise ConfigError(
-            f"cannot read {path}: {error}", "Check the path and that it is a text file."
-        ) from error
+        raise ConfigError(f"cannot read {path}: {error}", "Check the path and that it is a text file.") from error
     return parse_toml(text, kind, str(path))
 
 

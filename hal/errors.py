@@ -44,6 +44,4 @@ class MissingExtraError(LiraError):
     """A verb needs an optional part of the installation that is not there."""
 
     def __init__(self, package: str, extra: str) -> None:
-        super().__init__(
-            f"{package} is not installed", f"Install it with: pip install 'lira-rosbot[{extra}]'"
-        )
+        super().__init__(f"{package} is not installed", f"Install it with: pip install 'lira-rosbot[{extra}]'")

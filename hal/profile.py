@@ -22,7 +22,7 @@ Angle = Annotated[float, Meta(gt=0.0, le=6.2832)]
 STOP_BUDGET_S = 0.3
 
 
-class Base(Table):
+class Base(Table, frozen=True):
     """The body and its drive. `drive`: "kinematic" moves exactly as told, "wheels" has dynamics."""
 
     drive: Literal["kinematic", "wheels"]
@@ -36,7 +36,7 @@ class Base(Table):
     acceleration_m_s2: Positive  # the firmware's ramp, "wheels" only
 
 
-class Lidar(Table):
+class Lidar(Table, frozen=True):
     """A planar scanner at (x, z) from base_link's projection on the floor, `beams` over `fov_rad` centred ahead.
 
     A full turn (`fov_rad` 2 pi) has beams at fov/beams spacing, a sector includes both of its ends.
@@ -53,7 +53,7 @@ class Lidar(Table):
     dropout: Annotated[float, Meta(ge=0.0, le=1.0)] = 0.0  # share of beams that read nan
 
 
-class Camera(Table):
+class Camera(Table, frozen=True):
     """A pinhole camera at (x, z), pitched down by `pitch_rad`. `encoding` is how it travels."""
 
     x_m: float
@@ -68,7 +68,7 @@ class Camera(Table):
     noise_gray: NotNegative = 0.0  # standard deviation of a pixel, of 255
 
 
-class Features(Table):
+class Features(Table, frozen=True):
     """What the networks see: `bins` ranges over `fov_rad` ahead, clipped at `max_range_m`; a square gray image.
 
     `filters` is the width f of the camera trunk (16 simulated, 32 real).
@@ -81,7 +81,7 @@ class Features(Table):
     filters: Count
 
 
-class Control(Table):
+class Control(Table, frozen=True):
     """Rates and time-outs. A command drives for `policy_timeout_s` or `teleop_timeout_s` after it was decided."""
 
     rate_hz: Positive
@@ -89,7 +89,7 @@ class Control(Table):
     teleop_timeout_s: Positive
 
 
-class RobotProfile(Table):
+class RobotProfile(Table, frozen=True):
     """Everything that differs between robots, validated when it loads."""
 
     name: str
@@ -105,9 +105,7 @@ class RobotProfile(Table):
         for key in ("policy_timeout_s", "teleop_timeout_s"):
             value = getattr(self.control, key)
             if value >= STOP_BUDGET_S:
-                raise ValueError(
-                    f"control.{key} = {value} must be below the stop budget of {STOP_BUDGET_S} s"
-                )
+                raise ValueError(f"control.{key} = {value} must be below the stop budget of {STOP_BUDGET_S} s")
         if self.features.fov_rad > self.lidar.fov_rad + 1e-6:
             raise ValueError(
                 f"features.fov_rad = {self.features.fov_rad} is wider than lidar.fov_rad = {self.lidar.fov_rad}"
@@ -141,9 +139,7 @@ def profile_from_json(data: bytes) -> RobotProfile:
 def known_profiles() -> list[str]:
     """Names of the profiles that come with the project."""
     folder = resources.files("hal") / "profiles"
-    return sorted(
-        entry.name.removesuffix(".toml") for entry in folder.iterdir() if entry.name.endswith(".toml")
-    )
+    return sorted(entry.name.removesuffix(".toml") for entry in folder.iterdir() if entry.name.endswith(".toml"))
 
 
 def load_profile(name_or_path: str) -> RobotProfile:
