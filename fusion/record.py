@@ -1,0 +1,138 @@
+"""The record of a run: one JSON line per step and per result, for progress displays, tables, plots and reports.
+
+It is a by-product and may be deleted; what was learned lives in the demonstration log.
+"""
+
+from collections.abc import Iterator
+from pathlib import Path
+from types import TracebackType
+from typing import Self
+
+import msgspec
+
+from hal.errors import StorageError
+from hal.messages import CourseState, Decision
+
+
+class StepRecord(msgspec.Struct, frozen=True, tag="step"):
+    """One decision, where the robot really was, and what was learned from it.
+
+    `label` names the source of a label stored at this step ("human", "mean" or an expert's name), else None.
+    `image` is what the camera showed when a call rose: uint8 [px, px] row by row, else None.
+    """
+
+    decision: Decision
+    state: CourseState | None = None
+    layout: int = 0
+    label: str | None = None
+    image: bytes | None = None
+    elapsed_s: float = 0.0  # wall-clock time since the run began
+
+
+class LapRecord(msgspec.Struct, frozen=True, tag="lap"):
+    """The end of one lap. `phase` is "train", "prove" (the novice alone) or "unseen" (alone on a new layout).
+
+    `human_labels` (stored), `interventions`, `calls` and `buffer` are totals of the session so far; `passed` means: to
+    the end, no collision, line never lost. `unassisted` means that no human action was needed.
+    """
+
+    phase: str
+    lap: int
+    layout: int
+    passed: bool
+    unassisted: bool
+    duration_s: float
+    collisions: int
+    lost: int
+    lateral_rms_m: float
+    human_labels: int
+    interventions: int
+    calls: int
+    buffer: int
+    training_steps: int
+    elapsed_s: float
+
+
+class RunRecord(msgspec.Struct, frozen=True, tag="run"):
+    """The head of a run: how it was started, so that it can be repeated."""
+
+    world: str
+    profile: str
+    method: str
+    preset: str
+    layout: int
+    seed: int
+    command: str
+    version: str
+
+
+class ResultRecord(msgspec.Struct, frozen=True, tag="result"):
+    """The end of a run. `converged` is False for a run that met its cap: reported as censored, never dropped."""
+
+    converged: bool
+    laps: int
+    human_labels: int
+    demonstration: int
+    interventions: int
+    calls: int
+    buffer: int
+    training_steps: int
+    simulated_s: float
+    elapsed_s: float
+
+
+Record = RunRecord | StepRecord | LapRecord | ResultRecord
+
+
+class RunWriter:
+    """Appends records to a file as JSON lines, one write each."""
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        try:
+            path.parent.mkdir(parents=True, exist_ok=True)
+            self._file = path.open("ab", buffering=0)
+        except OSError as error:
+            raise StorageError(
+                f"cannot write the run record {path}: {error.strerror}", "Choose another folder."
+            ) from error
+
+    def write(self, record: Record) -> None:
+        """Append one record. Raises `StorageError` when the disk does not take it."""
+        try:
+            self._file.write(msgspec.json.encode(record) + b"\n")
+        except OSError as error:
+            raise StorageError(f"cannot write to {self.path}: {error.strerror}", "Free some space.") from error
+
+    def close(self) -> None:
+        """Let go of the file."""
+        self._file.close()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
+
+
+def read_run(path: Path) -> Iterator[Record]:
+    """Yield the records of a file; a torn last line (a run that was killed) is left out.
+
+    Raises `StorageError` for a file that is missing or not a run record.
+    """
+    decoder = msgspec.json.Decoder(Record)
+    try:
+        with path.open("rb") as file:
+            for number, line in enumerate(file, start=1):
+                if not line.endswith(b"\n"):
+                    return
+                try:
+                    yield decoder.decode(line)
+                except msgspec.MsgspecError as error:
+                    raise StorageError(
+                        f"{path}, line {number}, is not a run record: {error}", "Is it the right file?"
+                    ) from error
+    except OSError as error:
+        raise StorageError(f"cannot read {path}: {error.strerror}", "Check the path.") from error
