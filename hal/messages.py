@@ -48,12 +48,14 @@ class Command:
     """A wish to move, in SI units.
 
     `stamp_s` is when it was decided, `answers` the sequence number of the observation it answers (-1: none).
+    `released` marks the teleop command that follows the release of the dead-man: the wheel goes back to the policy.
     """
 
     twist: Twist
     stamp_s: float
     source: Source = Source.POLICY
     answers: int = -1
+    released: bool = False
 
 
 @dataclass(frozen=True, slots=True)
