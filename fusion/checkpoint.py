@@ -9,7 +9,7 @@ import msgspec
 from safetensors import SafetensorError, safe_open
 from safetensors.numpy import save
 
-from fusion.networks import IMAGE_PX, CameraNet, FusionNet, Kind, LidarNet, Network, get_weights, set_weights
+from fusion.networks import IMAGE_PX, CameraNet, FusionNet, Kind, LidarNet, Network
 from hal.errors import StorageError
 
 _KEY = "lira"  # the one metadata entry, JSON
@@ -36,7 +36,7 @@ class Checkpoint:
 def save_checkpoint(path: Path, network: Network, checkpoint: Checkpoint) -> None:
     """Write a checkpoint whole or not at all. Raises `StorageError`."""
     metadata = {_KEY: json.dumps(asdict(checkpoint))}
-    data = save(get_weights(network), metadata)
+    data = save(network.weights(), metadata)
     draft = path.with_name(f"{path.name}.{os.getpid()}.tmp")
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
@@ -68,7 +68,7 @@ def load_checkpoint(path: Path) -> tuple[Network, Checkpoint]:
     try:
         checkpoint = msgspec.json.decode(metadata[_KEY], type=Checkpoint)
         network = build(checkpoint)
-        set_weights(network, weights)
+        network.load_weights(weights)
     except (msgspec.MsgspecError, ValueError) as error:
         raise StorageError(f"{path} does not hold what it says it does: {error}", remedy) from error
     return network, checkpoint

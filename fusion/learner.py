@@ -6,7 +6,7 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from fusion.networks import Network, Weights, get_weights
+from fusion.networks import Network, Weights
 from hal.messages import Action, FloatArray
 
 GRAY_LEVELS = 255
@@ -75,7 +75,7 @@ class Learner:
 
     def weights(self) -> Weights:
         """Copy the network's weights."""
-        return get_weights(self.network)
+        return self.network.weights()
 
     def _update(self, pick: Tensor) -> float:
         inputs = [store.rows[pick] for store in self._inputs]

@@ -80,6 +80,24 @@ class Network(nn.Module, ABC):
             linear, angular = self(torch.from_numpy(scan)[None], torch.from_numpy(image)[None])[0].tolist()
         return linear, angular
 
+    def weights(self) -> Weights:
+        """Copy the weights out."""
+        return {name: tensor.numpy(force=True).copy() for name, tensor in self.state_dict().items()}
+
+    def load_weights(self, weights: Mapping[str, NDArray[Any]]) -> None:
+        """Put weights in, all or none. Raises `ValueError` where they do not fit or are not finite."""
+        own: dict[str, Tensor] = self.state_dict()
+        if own.keys() != weights.keys():
+            raise ValueError(f"weights of another network: {', '.join(sorted(own.keys() ^ weights.keys()))}")
+        for name, tensor in own.items():
+            new = weights[name]
+            if new.shape != tuple(tensor.shape) or new.dtype != np.float32:
+                raise ValueError(f"{name} is {new.dtype} {new.shape} instead of float32 {tuple(tensor.shape)}")
+            if not np.isfinite(new).all():
+                raise ValueError(f"{name} is not finite")
+        for name, tensor in own.items():
+            tensor.copy_(torch.from_numpy(weights[name]))
+
 
 class CameraNet(Network):
     """The camera expert: its trunk -> FC 2."""
@@ -170,24 +188,3 @@ def initialise(network: nn.Module, seed: int) -> None:
         if isinstance(layer, nn.Conv2d | nn.Linear):
             nn.init.xavier_uniform_(layer.weight, generator=generator)
             nn.init.zeros_(layer.bias)  # type: ignore[arg-type]
-
-
-def get_weights(network: nn.Module) -> Weights:
-    """Copy the weights out of a network."""
-    return {name: tensor.numpy(force=True).copy() for name, tensor in network.state_dict().items()}
-
-
-def set_weights(network: nn.Module, weights: Mapping[str, NDArray[Any]]) -> None:
-    """Put weights into a network, all or none. Raises `ValueError` where they do not fit or are not finite."""
-    own = network.state_dict()
-    if own.keys() != weights.keys():
-        raise ValueError(f"the weights are those of another network: {', '.join(sorted(own.keys() ^ weights.keys()))}")
-    for name, tensor in own.items():
-        if tuple(tensor.shape) != weights[name].shape or weights[name].dtype != np.float32:
-            raise ValueError(
-                f"{name} is {weights[name].dtype} {weights[name].shape}, not float32 {tuple(tensor.shape)}"
-            )
-        if not np.isfinite(weights[name]).all():
-            raise ValueError(f"{name} is not finite")
-    for name, tensor in own.items():
-        tensor.copy_(torch.from_numpy(weights[name]))

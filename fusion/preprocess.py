@@ -154,10 +154,10 @@ def _fill(values: FloatArray) -> FloatArray:
     bins = np.arange(values.size)
     after = np.searchsorted(known, bins).clip(max=known.size - 1)
     before = (np.searchsorted(known, bins, side="right") - 1).clip(min=0)
-    left, right = known[before], known[after]
-    to_left, to_right = np.abs(bins - left), np.abs(right - bins)
-    nearer = np.where(to_left < to_right, values[left], values[right])
-    return np.where(to_left == to_right, np.minimum(values[left], values[right]), nearer)
+    to_left, to_right = np.abs(bins - known[before]), np.abs(known[after] - bins)
+    left, right = values[known[before]], values[known[after]]
+    filled: FloatArray = np.where(to_left < to_right, left, right)
+    return np.where(to_left == to_right, np.minimum(left, right), filled)
 
 
 def gray_image(image: Image | CompressedImage, px: int) -> FloatArray:
