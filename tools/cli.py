@@ -1,0 +1,135 @@
+"""The `lira` command: one table of verbs, each a module that is imported when its verb is used."""
+
+import argparse
+import difflib
+import importlib
+import os
+import signal
+import sys
+from typing import NamedTuple, Protocol, cast
+
+from hal.errors import ConfigError, LiraError, MissingExtraError
+
+
+class Verb(NamedTuple):
+    """A line of `lira --help`."""
+
+    module: str
+    help: str
+
+
+VERBS = {
+    "demo": Verb("tools.verbs.demo", "teach a robot in the digital twin, from start to report, in minutes"),
+    "twin": Verb("tools.verbs.twin", "the digital twin: a simulated ROSbot on the bus"),
+    "fusion": Verb("tools.verbs.fusion", "the learner: reads sensors, decides, drives, trains (LIRA-SPF, HG-DAgger)"),
+    "train-expert": Verb("tools.verbs.train_expert", "train the camera or the lidar expert"),
+    "report": Verb("tools.verbs.report", "make the HTML page of a recorded run"),
+    "bench": Verb("tools.verbs.bench", "measure speed on this machine"),
+}
+
+# Packages that only a part of the installation has, and the extra that brings them.
+EXTRAS = {"pybullet": "sim", "torch": "learn", "safetensors": "learn"}
+
+EXIT_ERROR = 2
+EXIT_INTERRUPTED = 128 + signal.SIGINT
+EXIT_BROKEN_PIPE = 128 + signal.SIGPIPE
+
+
+class VerbModule(Protocol):
+    """What a module in tools/verbs offers."""
+
+    __doc__: str | None
+
+    def add_arguments(self, parser: argparse.ArgumentParser) -> None:
+        """Declare the verb's arguments."""
+
+    def run(self, args: argparse.Namespace) -> int:
+        """Do the work and return the exit status."""
+
+
+def main(arguments: list[str] | None = None) -> int:
+    """Run `lira` with `arguments` (default: the command line's) and return its exit status.
+
+    0: done. 1: done, but the answer is no (a demo that did not converge). 2: an error that the user can mend.
+    """
+    words = sys.argv[1:] if arguments is None else arguments
+    prefix = f"lira {words[0]}" if words and words[0] in VERBS else "lira"
+    try:
+        status = dispatch(words, prefix)
+        sys.stdout.flush()  # a reader that has gone shows here, not at exit
+    except KeyboardInterrupt:
+        return EXIT_INTERRUPTED
+    except BrokenPipeError:
+        # Python flushes stdout once more at exit: give it somewhere to go.
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return EXIT_BROKEN_PIPE
+    except ModuleNotFoundError as error:
+        extra = EXTRAS.get((error.name or "").split(".")[0])
+        if extra is None:
+            raise
+        return complain(prefix, MissingExtraError(str(error.name), extra))
+    except LiraError as error:
+        return complain(prefix, error)
+    return status
+
+
+def dispatch(words: list[str], program: str) -> int:
+    """Run what the words ask for. `SystemExit` (argparse: a verb's help, wrong usage) passes through."""
+    if not words or words[0] in ("-h", "--help"):
+        print(overview())
+        return 0
+    if words[0] == "--version":
+        print(f"lira {version()}")
+        return 0
+    module = cast(VerbModule, importlib.import_module(find_verb(words[0]).module))
+    description, _, examples = (module.__doc__ or "").partition("\n\n")
+    parser = argparse.ArgumentParser(
+        prog=program,
+        description=description,
+        epilog=examples.rstrip(),
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+        allow_abbrev=False,
+    )
+    module.add_arguments(parser)
+    return module.run(parser.parse_args(words[1:]))
+
+
+def complain(program: str, error: LiraError) -> int:
+    """Print one line for what is wrong and one for the remedy."""
+    print(f"{program}: {error.what}", file=sys.stderr)
+    if error.remedy:
+        print(f"  {error.remedy}", file=sys.stderr)
+    return EXIT_ERROR
+
+
+def find_verb(name: str) -> Verb:
+    """Look a verb up. Raises `ConfigError` that names the nearest one."""
+    if name in VERBS:
+        return VERBS[name]
+    near = difflib.get_close_matches(name, VERBS, n=1, cutoff=0.5)
+    remedy = f"Did you mean '{near[0]}'? " if near else ""
+    raise ConfigError(f"unknown verb '{name}'", f"{remedy}Verbs: {', '.join(VERBS)}.")
+
+
+def overview() -> str:
+    """Text of `lira --help`."""
+    width = max(map(len, VERBS))
+    lines = [f"  {name:<{width}}  {verb.help}" for name, verb in VERBS.items()]
+    return "\n".join(
+        [
+            "usage: lira VERB [arguments]",
+            "",
+            "Teach a ROSbot by interaction: single-sensor experts and a person train a fused policy (LIRA-SPF).",
+            "",
+            *lines,
+            "",
+            "`lira VERB --help` explains a verb; `lira --version` names the version. Start with `lira demo`.",
+        ]
+    )
+
+
+def version() -> str:
+    """Return the installed version."""
+    from importlib.metadata import version as installed
+
+    return installed("lira-rosbot")
