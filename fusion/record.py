@@ -3,6 +3,7 @@
 It is a by-product and may be deleted; what was learned lives in the demonstration log.
 """
 
+import math
 from collections.abc import Iterator
 from pathlib import Path
 from types import TracebackType
@@ -14,6 +15,41 @@ from hal.errors import StorageError
 from hal.messages import CourseState, Decision
 
 
+class Pose(msgspec.Struct, frozen=True):
+    """Ground truth at a step, from `CourseState`; None where a world has no line or no box (JSON knows no nan)."""
+
+    x_m: float
+    y_m: float
+    yaw_rad: float
+    linear_m_s: float
+    angular_rad_s: float
+    progress_m: float | None
+    lateral_m: float | None
+    clearance_m: float | None
+    collided: bool
+    lost: bool
+
+    @classmethod
+    def of(cls, state: CourseState) -> Self:
+        """Take over what a plot needs."""
+
+        def known(value: float) -> float | None:
+            return value if math.isfinite(value) else None
+
+        return cls(
+            state.x_m,
+            state.y_m,
+            state.yaw_rad,
+            state.linear_m_s,
+            state.angular_rad_s,
+            known(state.progress_m),
+            known(state.lateral_m),
+            known(state.clearance_m),
+            state.collided,
+            state.lost,
+        )
+
+
 class StepRecord(msgspec.Struct, frozen=True, tag="step"):
     """One decision, where the robot really was, and what was learned from it.
 
@@ -22,7 +58,7 @@ class StepRecord(msgspec.Struct, frozen=True, tag="step"):
     """
 
     decision: Decision
-    state: CourseState | None = None
+    state: Pose | None = None
     layout: int = 0
     label: str | None = None
     image: bytes | None = None
@@ -44,7 +80,7 @@ class LapRecord(msgspec.Struct, frozen=True, tag="lap"):
     duration_s: float
     collisions: int
     lost: int
-    lateral_rms_m: float
+    lateral_rms_m: float | None
     human_labels: int
     interventions: int
     calls: int

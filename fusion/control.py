@@ -1,0 +1,119 @@
+"""The control loop: read, decide, drive, learn, report, keep time. The same page drives every robot."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Protocol
+
+from fusion.method import STAND, Choice, Lesson, Method, Policy, Proposal
+from fusion.preprocess import Features, Preprocessor
+from hal.errors import SensorError
+from hal.messages import STOP, Action, Applied, Command, CourseState, Observation, Reason, Source, Twist
+from hal.port import Robot
+from hal.profile import Base
+
+
+class Teacher(Protocol):
+    """Whoever can take the wheel: a script here; a person does the same with a gamepad, from outside."""
+
+    def act(self, state: CourseState, proposal: Proposal, policy: Policy | None) -> Action | None:
+        """Return the human's action, or None while the dead-man is not held.
+
+        `policy` is what would drive from here on, None before the novice has learned anything.
+        """
+
+    def reset(self) -> None:
+        """A new episode begins."""
+
+
+@dataclass(frozen=True, slots=True)
+class Step:
+    """One pass of the loop. `state` is ground truth where there is any."""
+
+    observation: Observation
+    proposal: Proposal
+    applied: Applied
+    lesson: Lesson
+    state: CourseState | None
+
+
+def to_twist(action: Action, base: Base) -> Twist:
+    """Scale an action in [-1, 1]^2 to the robot's limits, clamped."""
+    linear, angular = (min(1.0, max(-1.0, a)) for a in action)
+    return Twist(linear * base.max_linear_m_s, angular * base.max_angular_rad_s)
+
+
+def to_action(twist: Twist, base: Base) -> Action:
+    """Inverse of `to_twist`."""
+    return twist.linear_m_s / base.max_linear_m_s, twist.angular_rad_s / base.max_angular_rad_s
+
+
+class ControlLoop:
+    """Runs a method on a robot at the profile's control rate, on the robot's own clock."""
+
+    def __init__(self, robot: Robot, truth: Callable[[], CourseState] | None = None) -> None:
+        self._robot = robot
+        self._truth = truth
+        self._base = robot.profile.base
+        self._period_s = robot.profile.period_s
+        self._deadline_s = robot.now()
+        self._preprocess = Preprocessor(robot.profile)
+        self._taught = False  # whether the teacher held the wheel at the last step
+        self.refused = 0  # observations that could not be used
+
+    def arm(self) -> None:
+        """Send the neutral command that a stopped robot asks for before it moves, and let one period pass."""
+        self._robot.drive(Command(STOP, self._robot.now(), answers=self._robot.read().seq))
+        self._keep_time()
+
+    def step(self, method: Method, teacher: Teacher | None = None) -> Step | None:
+        """Make one decision and let its period pass. Returns None if a sensor was stale or unusable: it stops then."""
+        method.update(self._robot.now())
+        observation = self._robot.read()
+        features = self._features(observation)
+        if features is None:
+            self._command(STAND, observation.seq)
+            self._keep_time()
+            return None
+        proposal = method.propose(features)
+        state = None if self._truth is None else self._truth()
+        if teacher is not None and state is not None:
+            self._teach(teacher.act(state, proposal, self._driving_policy(method, proposal)), observation.seq)
+        applied = self._command(proposal.command, observation.seq)
+        lesson = self._learn(method, proposal, applied)
+        self._keep_time()
+        return Step(observation, proposal, applied, lesson, state)
+
+    def _features(self, observation: Observation) -> Features | None:
+        try:
+            return self._preprocess(observation)
+        except SensorError:
+            self.refused += 1
+            return None
+
+    def _driving_policy(self, method: Method, proposal: Proposal) -> Policy | None:
+        driver = proposal.choice.driver
+        return None if driver == "human" else method.policy(driver)
+
+    def _teach(self, action: Action | None, answers: int) -> None:
+        """Drive for the scripted teacher through the same input that a gamepad uses."""
+        if action is None and not self._taught:
+            return
+        twist = STOP if action is None else to_twist(action, self._base)
+        self._robot.drive(Command(twist, self._robot.now(), Source.TELEOP, answers, released=action is None))
+        self._taught = action is not None
+
+    def _command(self, action: Action, answers: int) -> Applied:
+        return self._robot.drive(Command(to_twist(action, self._base), self._robot.now(), answers=answers))
+
+    def _learn(self, method: Method, proposal: Proposal, applied: Applied) -> Lesson:
+        """Learn from what was applied, not from what was wished for: nothing if the robot was held."""
+        if applied.source is Source.TELEOP:
+            return method.learn(proposal, to_action(applied.twist, self._base))
+        if applied.source is Source.POLICY and applied.reason is Reason.OK:
+            return method.learn(proposal, None)
+        return Lesson(Choice("none", STAND))
+
+    def _keep_time(self) -> None:
+        """Wait for the next absolute deadline; after a stall, start afresh instead of catching up."""
+        self._deadline_s = max(self._deadline_s + self._period_s, self._robot.now())
+        self._robot.wait(self._deadline_s)

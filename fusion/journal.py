@@ -1,0 +1,98 @@
+"""Writes down what happens at every step: the counts, the labels, the decision for the bus, the run record."""
+
+import time
+from collections.abc import Callable
+
+import numpy as np
+
+from fusion.control import Step
+from fusion.demonstrations import Demonstration
+from fusion.ledger import Ledger
+from fusion.method import Call
+from fusion.record import Pose, Record, StepRecord
+from hal.messages import Decision
+
+
+def _nowhere(_: object) -> None:
+    """Where a journal without a reader writes to."""
+
+
+class Journal:
+    """Turns steps into records and hands them on.
+
+    `keep` takes labels (the demonstration log), `write` run records, `publish` decisions. Labels go first: they are
+    what must not be lost.
+    """
+
+    def __init__(
+        self,
+        *,
+        keep: Callable[[Demonstration], None] = _nowhere,
+        write: Callable[[Record], None] = _nowhere,
+        publish: Callable[[Decision], None] = _nowhere,
+    ) -> None:
+        self.ledger = Ledger()
+        self.write = write
+        self._keep = keep
+        self._publish = publish
+        self._began_s = time.monotonic()
+        self._call = Call.NONE
+
+    @property
+    def elapsed_s(self) -> float:
+        """Wall-clock time since the journal was opened."""
+        return time.monotonic() - self._began_s
+
+    def note(self, step: Step, *, phase: str, lap: int, layout: int, training_steps: int) -> None:
+        """Record one step."""
+        choice, features = step.lesson.choice, step.proposal.features
+        if choice.label is not None:
+            self._keep(
+                Demonstration(
+                    stamp_s=step.observation.stamp_s,
+                    observation=step.observation.seq,
+                    lap=lap,
+                    source=choice.driver,
+                    action=choice.label,
+                    novice=step.proposal.novice,
+                    stored=step.lesson.stored,
+                    scan=features.scan,
+                    image=features.image,
+                )
+            )
+        if phase == "train":
+            self.ledger.note(step.lesson, trained=training_steps > 0)
+        decision = self._decision(step, phase, lap, training_steps)
+        self._publish(decision)
+        risen = choice.call not in (Call.NONE, self._call)
+        self._call = choice.call
+        self.write(
+            StepRecord(
+                decision,
+                state=None if step.state is None else Pose.of(step.state),
+                layout=layout,
+                label=choice.driver if step.lesson.stored else None,
+                image=(features.image * 255).round().astype(np.uint8).tobytes() if risen else None,
+                elapsed_s=self.elapsed_s,
+            )
+        )
+
+    def _decision(self, step: Step, phase: str, lap: int, training_steps: int) -> Decision:
+        choice, proposal = step.lesson.choice, step.proposal
+        return Decision(
+            stamp_s=step.observation.stamp_s,
+            observation=step.observation.seq,
+            driver=choice.driver,
+            call=str(choice.call),
+            executed=choice.action,
+            novice=proposal.novice,
+            human=choice.action if choice.driver == "human" else None,
+            experts=proposal.experts,
+            threshold=proposal.threshold,
+            labels=self.ledger.labels,
+            training_steps=training_steps,
+            interventions=self.ledger.interventions,
+            calls=self.ledger.calls,
+            phase=phase,
+            lap=lap,
+        )

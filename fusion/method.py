@@ -1,0 +1,113 @@
+"""What a way of teaching looks like to the control loop: it proposes before the robot moves and learns after."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from enum import StrEnum
+from typing import Protocol
+
+from fusion.preprocess import Features
+from hal.messages import Action, ExpertView
+
+Policy = Callable[[Features], Action]
+"""A black box: anything that turns what the robot senses into an action."""
+
+STAND: Action = (0.0, 0.0)
+
+
+class Call(StrEnum):
+    """How the human is called: to look, or to answer."""
+
+    NONE = "none"
+    ATTENTION = "attention"
+    FEEDBACK = "feedback"
+
+
+@dataclass(frozen=True, slots=True)
+class Expert:
+    """A named black box. `cruise` is its measured action where its sensor shows nothing to react to."""
+
+    name: str
+    act: Policy
+    cruise: Action = (1.0, 0.0)
+
+
+@dataclass(frozen=True, slots=True)
+class Choice:
+    """One row of the table of Algorithm 1: who drives, with which action, what is learned, how the human is called."""
+
+    driver: str
+    action: Action
+    label: Action | None = None
+    call: Call = Call.NONE
+
+
+@dataclass(frozen=True, slots=True)
+class Proposal:
+    """What a method wants done on one observation as long as no human decides otherwise."""
+
+    features: Features
+    choice: Choice
+    novice: Action = STAND
+    experts: tuple[ExpertView, ...] = ()
+    threshold: float = 0.0
+    speed: float = 1.0
+
+    @property
+    def command(self) -> Action:
+        """What the robot is told: both components times `speed`, so that the curvature is kept."""
+        linear, angular = self.choice.action
+        return linear * self.speed, angular * self.speed
+
+
+@dataclass(frozen=True, slots=True)
+class Lesson:
+    """What became of a proposal: the choice once the human is known, and whether a label was stored."""
+
+    choice: Choice
+    stored: bool = False
+
+
+class Method(Protocol):
+    """A way of driving and, perhaps, of learning."""
+
+    def reset(self) -> None:
+        """Forget what belongs to the past episode."""
+
+    def update(self, now_s: float) -> None:
+        """Adopt what training has brought by now."""
+
+    def propose(self, features: Features) -> Proposal:
+        """Decide as if no human were there."""
+
+    def learn(self, proposal: Proposal, human: Action | None) -> Lesson:
+        """Learn from what was executed; `human` is the human's action if the human drove."""
+
+    def policy(self, driver: str) -> Policy:
+        """Return the policy behind a driver's name, to look ahead with. Raises `KeyError` for "human"."""
+
+
+@dataclass(frozen=True, slots=True)
+class Alone:
+    """A policy that drives by itself and learns nothing: an expert on show, or the novice's proving run."""
+
+    name: str
+    act: Policy
+
+    def reset(self) -> None:
+        """Nothing to forget."""
+
+    def update(self, now_s: float) -> None:
+        """Nothing to adopt."""
+
+    def propose(self, features: Features) -> Proposal:
+        """Propose the policy's own action."""
+        action = self.act(features)
+        return Proposal(features, Choice(self.name, action), novice=action)
+
+    def learn(self, proposal: Proposal, human: Action | None) -> Lesson:
+        """Learn nothing; the human may still take over."""
+        return Lesson(proposal.choice if human is None else Choice("human", human))
+
+    def policy(self, driver: str) -> Policy:  # noqa: ARG002 - whoever drives, it is this one
+        """Return the one policy there is."""
+        return self.act

@@ -1,0 +1,85 @@
+"""The novice Pi^N and its labels D^N: it acts, drops redundant labels, and trains whenever m new ones are stored."""
+
+from typing import Protocol
+
+from fusion.learner import Label, Weights
+from fusion.networks import Network
+from fusion.preprocess import Features
+from hal.config import Table
+from hal.messages import Action
+
+
+class LearningSettings(Table, frozen=True):
+    """How labels become a policy; fractions are of the action range."""
+
+    labels_per_step: int = 30  # m
+    redundancy: float = 0.05  # L
+    action_range: float = 2.0
+    filter_human: bool = True  # False keeps every human label
+
+
+class Trainer(Protocol):
+    """Where training happens: in this process or in one of its own."""
+
+    def add(self, label: Label) -> None:
+        """Hand over one label."""
+
+    def start(self, now_s: float) -> None:
+        """Begin one training step."""
+
+    def poll(self, now_s: float) -> Weights | None:
+        """Return new weights once they are there."""
+
+    @property
+    def pending(self) -> bool:
+        """Whether a training step is under way."""
+
+    def close(self) -> None:
+        """End the trainer, in bounded time."""
+
+
+def is_redundant(a: Action, a_n: Action, threshold: float) -> bool:
+    """Whether the novice already does it: every |a_k - a^N_k| < L (section III-C)."""
+    return all(abs(x - y) < threshold for x, y in zip(a, a_n, strict=True))
+
+
+class Novice:
+    """A policy under training. Weights are swapped between two steps, never during one."""
+
+    def __init__(self, network: Network, trainer: Trainer, settings: LearningSettings) -> None:
+        self.network = network
+        self.settings = settings
+        self.stored = 0
+        self.training_steps = 0  # finished ones
+        self._trainer = trainer
+        self._fresh = 0  # stored since the last training step began
+
+    @property
+    def trained(self) -> bool:
+        """Whether the first training step is done."""
+        return self.training_steps > 0
+
+    def act(self, features: Features) -> Action:
+        """a^N of the current network."""
+        return self.network.act(features.scan, features.image)
+
+    def learn(self, features: Features, action: Action, source: str, a_n: Action) -> bool:
+        """Store a label unless it is redundant; `a_n` is the novice's own action there. Returns whether it was kept."""
+        threshold = self.settings.redundancy * self.settings.action_range
+        keep_always = source == "human" and not self.settings.filter_human
+        if not keep_always and is_redundant(action, a_n, threshold):
+            return False
+        self._trainer.add(Label(features.scan, features.image, action, source))
+        self.stored += 1
+        self._fresh += 1
+        return True
+
+    def update(self, now_s: float) -> None:
+        """Adopt weights that are ready; begin a training step if m new labels are stored. The remainder is carried."""
+        weights = self._trainer.poll(now_s)
+        if weights is not None:
+            self.network.load_weights(weights)
+            self.training_steps += 1
+        if self._fresh >= self.settings.labels_per_step and not self._trainer.pending:
+            self._fresh -= self.settings.labels_per_step
+            self._trainer.start(now_s)

@@ -1,0 +1,85 @@
+"""How the scripted teacher finds its way: it tries short steering sequences in its head and takes the best one."""
+
+from itertools import product
+from typing import TYPE_CHECKING, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hal.messages import Action, CourseState
+
+if TYPE_CHECKING:
+    from fusion.teacher import Foresight
+
+Style = Literal["bang-bang", "proportional"]
+
+# A plan is a few stages of constant steering, in steps of 0.2 s (5 Hz).
+STAGES_S = (0.4, 0.6, 0.8, 0.8)
+STEERING: dict[Style, tuple[float, ...]] = {"bang-bang": (-1.0, 0.0, 1.0), "proportional": (-1.0, -0.5, 0.0, 0.5, 1.0)}
+COMFORT_M = 0.30  # clearance below which closeness costs
+TOUCH_M = 0.03
+
+
+class Planner:
+    """Random-free sampling planner over a fixed set of action sequences [N, T, 2]."""
+
+    def __init__(self, foresight: "Foresight", style: Style, period_s: float) -> None:
+        self._foresight = foresight
+        self._period_s = period_s
+        self._style = style
+        self._sequences = action_sequences(style, period_s)
+        self._effort = np.abs(self._sequences[:, :, 1]).mean(axis=1)
+        self._standing = (self._sequences[:, :, 0] < 0.5).mean(axis=1)
+        self.reset()
+
+    def reset(self) -> None:
+        """Forget the last plan."""
+        self._last: float | None = None
+
+    def plan(self, state: CourseState) -> Action:
+        """Return the first action of the best sequence from `state`."""
+        cost = self._cost(state)
+        if self._last is not None:  # stay with a plan unless another is clearly better: labels with one mind
+            cost = cost + 0.1 * np.abs(self._sequences[:, 0, 1] - self._last)
+        linear, angular = self._sequences[int(np.argmin(cost)), 0]
+        if self._style == "proportional":
+            angular = self._blend(cost)
+        self._last = float(angular)
+        return float(linear), float(angular)
+
+    def _cost(self, state: CourseState) -> NDArray[np.float64]:
+        futures = self._foresight.imagine(state, self._sequences, self._period_s)
+        steps = self._sequences.shape[1]
+        hit = futures.clearance_m < TOUCH_M
+        first_hit = np.where(hit.any(axis=1), hit.argmax(axis=1), steps)
+        closeness = np.clip(1.0 - futures.clearance_m / COMFORT_M, 0.0, 1.0)
+        lateral = np.nan_to_num(np.abs(futures.lateral_m))
+        heading = np.nan_to_num(np.abs(futures.heading_error_rad[:, -1]))
+        cost: NDArray[np.float64] = (
+            100.0 * (1.0 - first_hit / steps)
+            + 3.0 * (closeness**2).mean(axis=1)
+            + 1.0 * (lateral**2).mean(axis=1)
+            + 0.5 * lateral[:, -1]
+            + 0.3 * heading
+            + 0.15 * self._effort
+            + 2.0 * self._standing
+        )
+        return cost
+
+    def _blend(self, cost: NDArray[np.float64]) -> float:
+        """A proportional hand steers between the best plans instead of jumping from one to another."""
+        weight = np.exp(-(cost - cost.min()) / 0.05)
+        return float(np.average(self._sequences[:, 0, 1], weights=weight))
+
+
+def action_sequences(style: Style, period_s: float) -> NDArray[np.float64]:
+    """All steering sequences of a style at full speed, and those that first turn on the spot: [N, T, 2]."""
+    counts = [max(1, round(stage / period_s)) for stage in STAGES_S]
+    rows = [(1.0, turns) for turns in product(STEERING[style], repeat=len(counts))]
+    rows += [(0.0, turns) for turns in product((-1.0, 1.0), *[STEERING["bang-bang"]] * (len(counts) - 1))]
+    sequences = np.zeros((len(rows), sum(counts), 2))
+    for sequence, (first, turns) in zip(sequences, rows, strict=True):
+        sequence[:, 0] = 1.0
+        sequence[: counts[0], 0] = first
+        sequence[:, 1] = np.repeat(turns, counts)
+    return sequences

@@ -1,0 +1,183 @@
+"""A course of teaching on a twin: laps with the teacher, a proving run after each, then layouts never seen."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import Protocol
+
+import numpy as np
+
+from fusion.control import ControlLoop, Step, Teacher
+from fusion.journal import Journal
+from fusion.method import Alone, Method
+from fusion.novice import Novice
+from fusion.record import LapRecord, ResultRecord
+from hal.errors import DeviceError
+from hal.messages import CourseState, Episode
+from hal.port import Arena, Robot
+
+PUT_BACK_M = 2.0  # after a crash in training the robot starts again this far before it
+PUT_ON_M = 1.0  # and on an unseen layout this far behind it
+LOST_OBSERVATIONS = 50  # unusable observations in a row that end a session
+
+
+class Apprentice(Method, Protocol):
+    """A method that trains a novice."""
+
+    @property
+    def novice(self) -> Novice:
+        """The policy under training."""
+
+
+@dataclass(frozen=True, slots=True)
+class Drive:
+    """One episode and when it counts as passed.
+
+    It ends at the finish or after `limit_s`; with `to_the_end` the finish must be reached, else to be unharmed is
+    enough. `final_lateral_m` bounds how far from the line it may end.
+    """
+
+    episode: Episode
+    limit_s: float
+    to_the_end: bool = True
+    final_lateral_m: float = float("inf")
+
+
+@dataclass(slots=True)
+class Tally:
+    """What happened in one lap."""
+
+    steps: int = 0
+    human_steps: int = 0
+    collisions: int = 0
+    lost: int = 0
+    unfinished: int = 0
+    lateral_m: list[float] = field(default_factory=list)
+
+    @property
+    def passed(self) -> bool:
+        """Unharmed and to the end."""
+        return self.collisions + self.lost + self.unfinished == 0
+
+
+class Session:
+    """Teaches one apprentice on one robot."""
+
+    def __init__(self, robot: Robot, arena: Arena, loop: ControlLoop, journal: Journal, apprentice: Apprentice) -> None:
+        self._robot = robot
+        self._arena = arena
+        self._loop = loop
+        self._journal = journal
+        self._apprentice = apprentice
+        self._began_s = robot.now()
+
+    def teach(self, drives: Sequence[Drive], teacher: Teacher, laps: int) -> bool:
+        """Train until the novice passes a proving run on the same drives. False if `laps` were not enough."""
+        for lap in range(1, laps + 1):
+            self._lap(self._apprentice, drives, "train", lap, teacher)
+            if self._apprentice.novice.trained and self._alone(drives, "prove", lap).passed:
+                return True
+        return False
+
+    def show(self, drives: Sequence[Drive]) -> list[LapRecord]:
+        """Let the frozen novice drive, each drive a lap of its own; after a crash it goes on behind it."""
+        return [self._alone([drive], "unseen", lap) for lap, drive in enumerate(drives, start=1)]
+
+    def result(self, converged: bool, laps: int) -> ResultRecord:
+        """Sum the session up."""
+        ledger = self._journal.ledger
+        return ResultRecord(
+            converged=converged,
+            laps=laps,
+            human_labels=ledger.labels.stored_human,
+            demonstration=ledger.labels.demonstration,
+            interventions=ledger.interventions,
+            calls=ledger.calls,
+            buffer=ledger.buffer,
+            training_steps=self._apprentice.novice.training_steps,
+            simulated_s=self._robot.now() - self._began_s,
+            elapsed_s=self._journal.elapsed_s,
+        )
+
+    def _alone(self, drives: Sequence[Drive], phase: str, lap: int) -> LapRecord:
+        return self._lap(Alone("novice", self._apprentice.novice.act), drives, phase, lap, None)
+
+    def _lap(self, method: Method, drives: Sequence[Drive], phase: str, lap: int, teacher: Teacher | None) -> LapRecord:
+        tally = Tally()
+        began_s = self._robot.now()
+        for drive in drives:
+            self._drive(method, drive, phase, lap, teacher, tally)
+            if phase == "prove" and not tally.passed:
+                break
+        ledger = self._journal.ledger
+        record = LapRecord(
+            phase=phase,
+            lap=lap,
+            layout=drives[0].episode.layout,
+            passed=tally.passed,
+            unassisted=tally.human_steps == 0,
+            duration_s=self._robot.now() - began_s,
+            collisions=tally.collisions,
+            lost=tally.lost,
+            lateral_rms_m=float(np.sqrt(np.mean(np.square(tally.lateral_m)))) if tally.lateral_m else None,
+            human_labels=ledger.labels.stored_human,
+            interventions=ledger.interventions,
+            calls=ledger.calls,
+            buffer=ledger.buffer,
+            training_steps=self._apprentice.novice.training_steps,
+            elapsed_s=self._journal.elapsed_s,
+        )
+        self._journal.write(record)
+        return record
+
+    def _drive(self, method: Method, drive: Drive, phase: str, lap: int, teacher: Teacher | None, tally: Tally) -> None:
+        """One episode, with the robot put back after a crash unless this is a proving run."""
+        self._begin(drive.episode, method, teacher)
+        end_s = self._robot.now() + drive.limit_s
+        state = self._arena.state()
+        while not state.finished and self._robot.now() < end_s:
+            step = self._step(method, teacher)
+            self._journal.note(
+                step,
+                phase=phase,
+                lap=lap,
+                layout=drive.episode.layout,
+                training_steps=self._apprentice.novice.training_steps,
+            )
+            tally.steps += 1
+            tally.human_steps += step.lesson.choice.driver == "human"
+            state = self._arena.state()
+            if np.isfinite(state.lateral_m):
+                tally.lateral_m.append(state.lateral_m)
+            if state.collided or state.lost:
+                tally.collisions += state.collided
+                tally.lost += state.lost
+                if phase == "prove":
+                    return
+                self._begin(_after_crash(drive.episode, state, phase), method, teacher)
+        tally.unfinished += drive.to_the_end and not state.finished
+        tally.unfinished += abs(np.nan_to_num(state.lateral_m)) > drive.final_lateral_m
+
+    def _begin(self, episode: Episode, method: Method, teacher: Teacher | None) -> None:
+        self._arena.reset(episode)
+        self._journal.ledger.new_episode()
+        method.reset()
+        if teacher is not None:
+            teacher.reset()
+
+    def _step(self, method: Method, teacher: Teacher | None) -> Step:
+        for _ in range(LOST_OBSERVATIONS):
+            step = self._loop.step(method, teacher)
+            if step is not None:
+                return step
+        raise DeviceError(
+            f"{LOST_OBSERVATIONS} observations in a row could not be used",
+            "Check the lidar and the camera: 'refused' in the log says what was wrong.",
+        )
+
+
+def _after_crash(episode: Episode, state: CourseState, phase: str) -> Episode:
+    """Where the robot is put down after a crash: before it to try again, or behind it to go on."""
+    if not np.isfinite(state.progress_m):
+        return episode
+    shift = -PUT_BACK_M if phase == "train" else PUT_ON_M
+    return Episode(episode.layout, start_m=max(0.0, state.progress_m + shift))

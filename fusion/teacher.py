@@ -1,0 +1,153 @@
+"""The scripted teacher: stands in for the person with the gamepad, faults included.
+
+It sees the simulator's state, looks ahead with the policy that is driving, takes over before a collision or a lost
+line, and hands back once that policy has looked safe for a few steps. When called it reacts sooner.
+"""
+
+import math
+from collections.abc import Callable
+from typing import Annotated, Literal, Protocol
+
+import numpy as np
+from msgspec import Meta
+from numpy.typing import NDArray
+
+from fusion.method import STAND, Call, Policy, Proposal
+from fusion.planner import Planner
+from fusion.preprocess import Preprocessor
+from hal.config import Table
+from hal.messages import Action, CourseState, Observation
+from hal.profile import RobotProfile
+
+Share = Annotated[float, Meta(ge=0.0, le=1.0)]
+
+
+class Futures(Protocol):
+    """Imagined drives, each array [N, T]; what a world has no line for is nan."""
+
+    clearance_m: NDArray[np.float64]
+    lateral_m: NDArray[np.float64]
+    heading_error_rad: NDArray[np.float64]
+
+
+class Foresight(Protocol):
+    """A second twin to try things in."""
+
+    def rollout(
+        self, state: CourseState, policy: Callable[[Observation], Action], steps: int, period_s: float
+    ) -> list[CourseState]:
+        """Let a policy drive from `state`, with rendered sensors; ends early at a collision or lost line."""
+
+    def imagine(self, state: CourseState, actions: NDArray[np.float64], period_s: float) -> Futures:
+        """Follow action sequences [N, T, 2] from `state`, without sensors."""
+
+
+class TeacherSettings(Table, frozen=True):
+    """The teacher's skill. The defaults are a skilled human's faults (all assumed); see `PERFECT`."""
+
+    style: Literal["bang-bang", "proportional"] = "bang-bang"
+    horizon_s: float = 1.5
+    margin_m: float = 0.08  # closer than this to a box is danger
+    lateral_m: float = 1.0  # further than this from the line is danger
+    safe_steps: int = 3
+    delay_s: float = 0.6  # median of the log-normal reaction delay
+    called_delay_s: float = 0.35
+    delay_sigma: float = 0.3
+    gain_sigma: float = 0.15  # over- and understeer, log-normal, per intervention
+    wrong_direction: Share = 0.05
+    missed: Share = 0.02
+
+
+SKILLED = TeacherSettings()
+PERFECT = TeacherSettings(delay_s=0.0, called_delay_s=0.0, gain_sigma=0.0, wrong_direction=0.0, missed=0.0)
+TEACHERS = {"human": SKILLED, "perfect": PERFECT}
+
+
+class ScriptedTeacher:
+    """Watches, takes over when it must, drives, and hands back."""
+
+    def __init__(self, foresight: Foresight, profile: RobotProfile, settings: TeacherSettings, seed: int) -> None:
+        self._foresight = foresight
+        self._settings = settings
+        self._period_s = profile.period_s
+        self._steps = math.ceil(settings.horizon_s / profile.period_s)
+        self._preprocess = Preprocessor(profile)
+        self._planner = Planner(foresight, settings.style, profile.period_s)
+        self._random = np.random.default_rng(seed)
+        self.reset()
+
+    def reset(self) -> None:
+        """A new episode: hands off, nothing seen yet."""
+        self._driving = False
+        self._react_at_s: float | None = None  # when a danger that was seen will be answered
+        self._safe = 0
+        self._driven = 0
+        self._gain, self._wrong_steps = 1.0, 0
+        self._planner.reset()
+
+    def act(self, state: CourseState, proposal: Proposal, policy: Policy | None) -> Action | None:
+        """Return the action while it holds the wheel, else None."""
+        if policy is None:
+            return self._planner.plan(state)  # the initial demonstration: careful and without faults
+        danger = self._danger(state, policy)
+        if self._driving:
+            self._safe = 0 if danger else self._safe + 1
+            self._driving = self._safe < self._settings.safe_steps
+        elif self._reacts(state.stamp_s, danger, called=proposal.choice.call is not Call.NONE):
+            self._take_over()
+        if not self._driving:
+            return None
+        return self._with_faults(self._planner.plan(state))
+
+    def _danger(self, state: CourseState, policy: Policy) -> bool:
+        """Whether the policy would hit something or lose the line within the horizon, at its full speed."""
+        if not self._within_reach(state):
+            return False
+        drive = self._foresight.rollout(state, self._seeing(policy), self._steps, self._period_s)
+        return any(self._bad(each.clearance_m, each.lateral_m) or each.collided or each.lost for each in drive)
+
+    def _within_reach(self, state: CourseState) -> bool:
+        """Whether any steering at all could end badly. Saves looking ahead with rendered sensors where none can."""
+        turns = np.linspace(-1.0, 1.0, 9)
+        actions = np.zeros((turns.size, self._steps, 2))
+        actions[:, :, 0] = 1.0
+        actions[:, :, 1] = turns[:, None]
+        futures = self._foresight.imagine(state, actions, self._period_s)
+        close = futures.clearance_m < self._settings.margin_m + 0.1
+        far = np.abs(futures.lateral_m) > self._settings.lateral_m
+        return bool(close.any() or far.any())
+
+    def _bad(self, clearance_m: float, lateral_m: float) -> bool:
+        return clearance_m < self._settings.margin_m or abs(lateral_m) > self._settings.lateral_m
+
+    def _seeing(self, policy: Policy) -> Callable[[Observation], Action]:
+        def act(observation: Observation) -> Action:
+            features = self._preprocess(observation)
+            return STAND if features is None else policy(features)
+
+        return act
+
+    def _reacts(self, now_s: float, danger: bool, *, called: bool) -> bool:
+        """Whether the hand moves now: a danger has lasted for as long as it takes to react to it."""
+        if not danger:
+            self._react_at_s = None
+            return False
+        if self._react_at_s is None:
+            median = self._settings.called_delay_s if called else self._settings.delay_s
+            missed = self._random.random() < self._settings.missed
+            delay = median * math.exp(self._settings.delay_sigma * self._random.standard_normal())
+            self._react_at_s = math.inf if missed else now_s + delay
+        return now_s >= self._react_at_s - 1e-9
+
+    def _take_over(self) -> None:
+        self._driving, self._safe, self._react_at_s = True, 0, None
+        self._gain = math.exp(self._settings.gain_sigma * self._random.standard_normal())
+        self._wrong_steps = 2 if self._random.random() < self._settings.wrong_direction else 0
+        self._planner.reset()
+
+    def _with_faults(self, action: Action) -> Action:
+        linear, angular = action
+        if self._wrong_steps:
+            self._wrong_steps -= 1
+            angular = -angular
+        return linear, max(-1.0, min(1.0, angular * self._gain))
