@@ -23,7 +23,11 @@ STOP_BUDGET_S = 0.3
 
 
 class Base(Table, frozen=True):
-    """The body and its drive. `drive`: "kinematic" moves exactly as told, "wheels" has dynamics."""
+    """The body and its drive. `drive`: "kinematic" moves exactly as told, "wheels" has dynamics.
+
+    `track_m` is the one commands are turned into wheel speeds with. Four fixed wheels skid, so the body turns as if
+    they stood `effective_track_m` apart, and the odometry reckons with `odometry_track_m` (both `track_m` if absent).
+    """
 
     drive: Literal["kinematic", "wheels"]
     length_m: Positive
@@ -34,6 +38,8 @@ class Base(Table, frozen=True):
     max_linear_m_s: Positive
     max_angular_rad_s: Positive
     acceleration_m_s2: Positive  # the firmware's ramp, "wheels" only
+    effective_track_m: Positive | None = None  # "wheels" only
+    odometry_track_m: Positive | None = None  # "wheels" only
 
 
 class Lidar(Table, frozen=True):

@@ -1,0 +1,137 @@
+"""The robot on its course: it moves, boxes block it, and a referee watches. Pure: the time is handed in."""
+
+import math
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from hal.messages import STOP, CourseState, Odometry, Twist
+from hal.profile import Base
+from sim_backend import drive
+from sim_backend.course import Course
+
+# The referee looks at least this often, and every centimetre or so where a box may be touched.
+REFEREE_PERIOD_S = 0.2
+TOUCH_PERIOD_S = 0.01
+
+
+@dataclass(frozen=True, slots=True)
+class Verdict:
+    """What the referee knows of the present episode."""
+
+    start_m: float
+    progress_m: float
+    lateral_m: float
+    clearance_m: float
+    collided: bool = False
+    lost: bool = False
+    finished: bool = False
+
+
+class Body:
+    """One robot on one course. `time_s` is how far its motion has been worked out."""
+
+    def __init__(self, base: Base, course: Course) -> None:
+        self._base = base
+        self.course = course
+        self.time_s = 0.0
+        self.put_down(0.0, 0.0, 0.0)
+
+    def put_down(self, start_m: float, lateral_m: float, yaw_rad: float) -> None:
+        """Start an episode at rest, at a place relative to the course."""
+        self.motion = drive.motion(*self.course.start_pose(start_m, lateral_m, yaw_rad))
+        self.odometry = drive.motion(0.0, 0.0, 0.0)
+        self.command(STOP)
+        self.verdict = Verdict(start_m, start_m, lateral_m, math.inf)
+        self._judge(touched=False)
+
+    def place(self, state: CourseState) -> None:
+        """Continue from a state that a twin told: pose, velocity, progress; nothing has gone wrong yet."""
+        self.motion = drive.motion(state.x_m, state.y_m, state.yaw_rad, state.linear_m_s, state.angular_rad_s)
+        self.odometry = drive.motion(0.0, 0.0, 0.0)
+        self.command(Twist(state.linear_m_s, state.angular_rad_s))
+        progress_m = self._progress_m(None if math.isnan(state.progress_m) else state.progress_m)
+        self.verdict = Verdict(progress_m, progress_m, 0.0, math.inf)
+        self._judge(touched=False)
+
+    def command(self, target: Twist) -> None:
+        """Set the velocity to drive at from now on."""
+        self._target = target
+        self._commanded_s = self.time_s
+
+    def advance(self, until_s: float) -> None:
+        """Work the motion out until `until_s`."""
+        while (left_s := until_s - self.time_s) > 1e-9:
+            speed = max(abs(float(self.motion.linear_m_s)), abs(self._target.linear_m_s))
+            duration_s = min(left_s, REFEREE_PERIOD_S)
+            if speed * duration_s >= self.verdict.clearance_m:
+                duration_s = min(left_s, TOUCH_PERIOD_S)
+            self._step(duration_s)
+            self.time_s += duration_s
+        self.time_s = max(self.time_s, until_s)
+
+    def state(self) -> CourseState:
+        """Ground truth at `time_s`."""
+        motion, verdict, has_line = self.motion, self.verdict, self.course.has_line
+        return CourseState(
+            stamp_s=self.time_s,
+            x_m=float(motion.x_m),
+            y_m=float(motion.y_m),
+            yaw_rad=math.remainder(float(motion.yaw_rad), math.tau),
+            linear_m_s=float(motion.linear_m_s),
+            angular_rad_s=float(motion.angular_rad_s),
+            progress_m=verdict.progress_m if has_line else math.nan,
+            lateral_m=verdict.lateral_m if has_line else math.nan,
+            clearance_m=verdict.clearance_m,
+            collided=verdict.collided,
+            lost=verdict.lost,
+            finished=verdict.finished,
+        )
+
+    def measured(self) -> Odometry:
+        """What the wheels' encoders make of the motion since the start of the episode."""
+        odometry = self.odometry
+        return Odometry(
+            stamp_s=self.time_s,
+            x_m=float(odometry.x_m),
+            y_m=float(odometry.y_m),
+            yaw_rad=math.remainder(float(odometry.yaw_rad), math.tau),
+            linear_m_s=float(odometry.linear_m_s),
+            angular_rad_s=float(odometry.angular_rad_s),
+        )
+
+    def _step(self, duration_s: float) -> None:
+        target = self._target
+        silent_s = self.time_s - self._commanded_s
+        if self._base.drive == "wheels" and silent_s >= drive.FIRMWARE_WATCHDOG_S:
+            target = STOP
+        before = self.motion
+        after = drive.step(
+            self._base, before, np.float64(target.linear_m_s), np.float64(target.angular_rad_s), duration_s
+        )
+        clearance_m = float(self.course.clearance(after.xy))
+        touched = clearance_m < 0.0 and clearance_m < self.verdict.clearance_m
+        if touched:
+            # A disc that touches can turn, and back away, but not go on.
+            after = replace(after, x_m=before.x_m, y_m=before.y_m, linear_m_s=np.float64(0.0))
+        self.motion = after
+        rate = drive.odometry_rate_rad_s(self._base, after)
+        self.odometry = drive.glide(self.odometry, after.linear_m_s, rate, duration_s)
+        self._judge(touched)
+
+    def _progress_m(self, hint_m: float | None) -> float:
+        return float(self.course.place(self.motion.xy, self.motion.yaw_rad, hint_m).progress_m)
+
+    def _judge(self, touched: bool) -> None:
+        course, was = self.course, self.verdict
+        place = course.place(self.motion.xy, self.motion.yaw_rad, was.progress_m)
+        progress_m, lateral_m = float(place.progress_m), float(place.lateral_m)
+        self.verdict = Verdict(
+            start_m=was.start_m,
+            progress_m=progress_m,
+            lateral_m=lateral_m,
+            clearance_m=float(course.clearance(self.motion.xy)),
+            collided=was.collided or touched,
+            lost=was.lost or bool(course.lost(place.lateral_m)),
+            finished=was.finished or course.finished(progress_m, was.start_m),
+        )

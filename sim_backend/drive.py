@@ -1,0 +1,89 @@
+"""How the base moves. One vectorised step serves the twin (one robot) and the planner (many imagined ones).
+
+"kinematic": the velocity is the target at once, integrated exactly along the arc.
+"wheels": the firmware of the CORE2 at 100 Hz turns the target into two wheel speeds (v -+ omega track / 2, at most
+1 m/s) and ramps towards them; four fixed wheels skid in a turn, so the body turns as if the track were wider.
+"""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from hal.profile import Base
+from sim_backend.polyline import Floats
+
+FIRMWARE_PERIOD_S = 0.01
+FIRMWARE_WATCHDOG_S = 1.0
+WHEEL_LIMIT_M_S = 1.0
+
+
+@dataclass(frozen=True, slots=True)
+class Motion:
+    """Pose and velocity of base_link, arrays [...] of one shape."""
+
+    x_m: Floats
+    y_m: Floats
+    yaw_rad: Floats
+    linear_m_s: Floats
+    angular_rad_s: Floats
+
+    @property
+    def xy(self) -> Floats:
+        """Position [..., 2]."""
+        return np.stack([self.x_m, self.y_m], axis=-1)
+
+
+def motion(x_m: float, y_m: float, yaw_rad: float, linear_m_s: float = 0.0, angular_rad_s: float = 0.0) -> Motion:
+    """Make the motion of a single robot, arrays of shape []."""
+    return Motion(*(np.asarray(value, dtype=np.float64) for value in (x_m, y_m, yaw_rad, linear_m_s, angular_rad_s)))
+
+
+def step(base: Base, now: Motion, linear_m_s: Floats, angular_rad_s: Floats, duration_s: float) -> Motion:
+    """Move for `duration_s` towards a target velocity [...]."""
+    if base.drive == "kinematic":
+        return glide(now, linear_m_s, angular_rad_s, duration_s)
+    count = max(math.ceil(duration_s / FIRMWARE_PERIOD_S - 1e-9), 1)
+    for _ in range(count):
+        linear, angular = ramp_wheels(base, now, linear_m_s, angular_rad_s, duration_s / count)
+        now = glide(now, linear, angular, duration_s / count)
+    return now
+
+
+def ramp_wheels(
+    base: Base, now: Motion, linear_m_s: Floats, angular_rad_s: Floats, duration_s: float
+) -> tuple[Floats, Floats]:
+    """Velocity of the body after the firmware has worked on the wheels for `duration_s`."""
+    change = base.acceleration_m_s2 * duration_s
+    wheels = []
+    for side in (-0.5, 0.5):
+        target = linear_m_s + side * angular_rad_s * base.track_m
+        target = np.clip(target, -WHEEL_LIMIT_M_S, WHEEL_LIMIT_M_S)
+        speed = now.linear_m_s + side * now.angular_rad_s * effective_track_m(base)
+        wheels.append(speed + np.clip(target - speed, -change, change))
+    left, right = wheels
+    return (left + right) / 2, (right - left) / effective_track_m(base)
+
+
+def glide(now: Motion, linear_m_s: Floats, angular_rad_s: Floats, duration_s: float) -> Motion:
+    """Follow an arc of constant velocity, exactly."""
+    half_turn = angular_rad_s * duration_s / 2
+    chord = linear_m_s * duration_s * np.sinc(half_turn / math.pi)
+    return Motion(
+        now.x_m + chord * np.cos(now.yaw_rad + half_turn),
+        now.y_m + chord * np.sin(now.yaw_rad + half_turn),
+        now.yaw_rad + 2 * half_turn,
+        linear_m_s,
+        angular_rad_s,
+    )
+
+
+def effective_track_m(base: Base) -> float:
+    """Return the track the body turns by."""
+    return base.effective_track_m or base.track_m
+
+
+def odometry_rate_rad_s(base: Base, now: Motion) -> Floats:
+    """Yaw rate that the firmware reports: the wheels' difference over its own idea of the track."""
+    track_m = base.odometry_track_m or base.track_m
+    return now.angular_rad_s * effective_track_m(base) / track_m

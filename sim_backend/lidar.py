@@ -1,0 +1,63 @@
+"""The lidar: a fan of rays against the scene's boxes, and its noise."""
+
+import math
+
+import numpy as np
+
+from hal.messages import FloatArray, LaserScan
+from hal.profile import Lidar
+from sim_backend.polyline import Floats
+from sim_backend.scene import Scene
+
+
+def beam_angles(lidar: Lidar) -> tuple[Floats, float]:
+    """Angles [beams] from base_link's x, counter-clockwise, and their increment.
+
+    A sector includes both of its ends; a full turn begins behind and has no beam twice.
+    """
+    full_turn = lidar.fov_rad > math.tau - 1e-3
+    increment = lidar.fov_rad / (lidar.beams if full_turn else max(lidar.beams - 1, 1))
+    return -lidar.fov_rad / 2 + increment * np.arange(lidar.beams), increment
+
+
+class RayLidar:
+    """Scans a scene from the robot's pose."""
+
+    def __init__(self, lidar: Lidar, scene: Scene, rng: np.random.Generator) -> None:
+        self._lidar = lidar
+        self._scene = scene
+        self._rng = rng
+        self._angles, self._increment = beam_angles(lidar)
+
+    def scan(self, x_m: float, y_m: float, yaw_rad: float, stamp_s: float) -> LaserScan:
+        """One turn, captured at an instant. Ranges after REP-117: +inf no return, -inf too close, nan dropped out."""
+        lidar = self._lidar
+        origin = [x_m + lidar.x_m * math.cos(yaw_rad), y_m + lidar.x_m * math.sin(yaw_rad), lidar.z_m]
+        ends = np.empty((lidar.beams, 3))
+        ends[:, 0] = origin[0] + lidar.range_max_m * np.cos(self._angles + yaw_rad)
+        ends[:, 1] = origin[1] + lidar.range_max_m * np.sin(self._angles + yaw_rad)
+        ends[:, 2] = lidar.z_m
+        hits = self._scene.bullet.rayTestBatch(
+            [origin] * lidar.beams, ends.tolist(), physicsClientId=self._scene.client
+        )
+        ranges = np.array([hit[2] if hit[0] >= 0 else math.inf for hit in hits]) * lidar.range_max_m
+        return LaserScan(
+            stamp_s=stamp_s,
+            angle_min=float(self._angles[0]),
+            angle_increment=self._increment,
+            range_min=lidar.range_min_m,
+            range_max=lidar.range_max_m,
+            ranges=self._spoil(ranges),
+            scan_time=1.0 / lidar.rate_hz,
+        )
+
+    def _spoil(self, ranges: Floats) -> FloatArray:
+        """Add the noise of a real device, then say what it cannot measure."""
+        lidar = self._lidar
+        if lidar.noise_m:
+            ranges = ranges + self._rng.normal(0.0, lidar.noise_m, len(ranges))
+        ranges = np.where(ranges > lidar.range_max_m, math.inf, ranges)
+        ranges = np.where(ranges < lidar.range_min_m, -math.inf, ranges)
+        if lidar.dropout:
+            ranges = np.where(self._rng.random(len(ranges)) < lidar.dropout, math.nan, ranges)
+        return ranges.astype(np.float32)

@@ -1,0 +1,67 @@
+"""What the twin's robot sees: camera and lidar over one scene, each captured anew only when its period has passed."""
+
+import numpy as np
+
+from hal.errors import ConfigError
+from hal.messages import CompressedImage, Image, LaserScan
+from hal.profile import RobotProfile
+from sim_backend.camera import PinholeCamera, Renderer, add_noise, encode_jpeg, wants_egl
+from sim_backend.drive import Motion
+from sim_backend.layout import Layout
+from sim_backend.lidar import RayLidar
+from sim_backend.scene import Scene
+
+ROUNDING_S = 1e-9
+
+
+class Sensors:
+    """Camera and lidar of a profile over a layout. Not thread-safe.
+
+    Raises `ConfigError` if EGL is asked for and this machine has none.
+    """
+
+    def __init__(self, profile: RobotProfile, layout: Layout, renderer: Renderer, seed: int) -> None:
+        self._profile = profile
+        self._scene = Scene(layout, egl=wants_egl(profile.camera, renderer))
+        if renderer == "egl" and not self._scene.egl:
+            self._scene.close()
+            raise ConfigError(
+                "pybullet cannot draw with EGL on this machine",
+                "Install an EGL driver (Debian: libegl1 and libgl1-mesa-dri), or use the renderer 'tiny'.",
+            )
+        self.renderer = "egl" if self._scene.egl else "tiny"
+        self._camera_rng, lidar_rng = (np.random.default_rng([seed, stream]) for stream in (1, 2))
+        self._camera = PinholeCamera(profile.camera, self._scene, layout.world.sky_gray)
+        self._lidar = RayLidar(profile.lidar, self._scene, lidar_rng)
+        self.forget()
+
+    def forget(self) -> None:
+        """Whatever was captured belongs to another episode."""
+        self._image: Image | CompressedImage | None = None
+        self._scan: LaserScan | None = None
+
+    def arrange(self, layout: Layout) -> None:
+        """Move the boxes."""
+        self._scene.arrange(layout)
+
+    def image(self, motion: Motion, now_s: float) -> Image | CompressedImage:
+        """Return the newest picture, encoded as the profile wants it to travel."""
+        camera = self._profile.camera
+        if self._image is None or now_s - self._image.stamp_s >= 1.0 / camera.rate_hz - ROUNDING_S:
+            picture = self._camera.render(float(motion.x_m), float(motion.y_m), float(motion.yaw_rad))
+            picture = add_noise(picture, camera.noise_gray, self._camera_rng)
+            if camera.encoding == "jpeg":
+                self._image = CompressedImage(now_s, encode_jpeg(picture))
+            else:
+                self._image = Image(now_s, picture)
+        return self._image
+
+    def scan(self, motion: Motion, now_s: float) -> LaserScan:
+        """Return the newest turn of the lidar."""
+        if self._scan is None or now_s - self._scan.stamp_s >= 1.0 / self._profile.lidar.rate_hz - ROUNDING_S:
+            self._scan = self._lidar.scan(float(motion.x_m), float(motion.y_m), float(motion.yaw_rad), now_s)
+        return self._scan
+
+    def close(self) -> None:
+        """Let go of the scene. May be called twice."""
+        self._scene.close()

@@ -1,0 +1,173 @@
+"""The digital twin: a robot adapter whose floor is in pybullet, and an arena that knows the truth."""
+
+import math
+import threading
+import time
+
+from hal.errors import ConfigError, DeviceError
+from hal.messages import STOP, Applied, Command, CourseState, Episode, Observation, Reason, Source, Twist
+from hal.profile import Base, RobotProfile
+from sim_backend.body import Body
+from sim_backend.camera import Renderer
+from sim_backend.course import Course, footprint_radius_m
+from sim_backend.layout import Layout, build
+from sim_backend.scene import import_pybullet
+from sim_backend.sensors import ROUNDING_S, Sensors
+from sim_backend.world import World, load_world
+
+ODOMETRY_PERIOD_S = 0.05
+
+
+class Twin:
+    """A simulated robot in a world; implements `hal.port.Robot` and `hal.port.Arena`.
+
+    `world` is a name, a path or a `World`. With `realtime_factor` None the time belongs to the caller and passes only
+    in `wait`; with a number it passes by itself, that many times as fast as the monotonic clock. It never runs back,
+    not even over a reset. `drive` may be called from any thread and never waits for a picture.
+
+    Raises `MissingExtraError` without pybullet, `ConfigError` for an unknown world or a bad factor.
+    """
+
+    def __init__(
+        self,
+        profile: RobotProfile,
+        world: str | World,
+        *,
+        layout: int = 0,
+        seed: int = 0,
+        realtime_factor: float | None = None,
+        renderer: Renderer = "auto",
+    ) -> None:
+        import_pybullet()
+        if realtime_factor is not None and not 0.0 < realtime_factor < math.inf:
+            raise ConfigError(f"real-time factor {realtime_factor} is not positive", "Use 1 for real time.")
+        self._profile = profile
+        self.world = load_world(world) if isinstance(world, str) else world
+        self._renderer = renderer
+        self._seed = seed
+        self._factor = realtime_factor
+        self._began_s = time.monotonic()
+        self._sensors: Sensors | None = None
+        self._newest: Observation | None = None
+        self._seq = 0
+        # Rendering is slow, motion is not: whoever drives needs the second lock only. Taken in this order.
+        self._sensor_lock = threading.Lock()
+        self._lock = threading.Lock()
+        self._body = Body(profile.base, Course(build(self.world, layout), footprint_radius_m(profile.base)))
+
+    @property
+    def profile(self) -> RobotProfile:
+        """The robot's profile."""
+        return self._profile
+
+    @property
+    def layout(self) -> Layout:
+        """The floor as it is now."""
+        return self._body.course.layout
+
+    @property
+    def renderer(self) -> str:
+        """What draws the pictures: "tiny" or "egl"; "none" while the twin is not open."""
+        return self._sensors.renderer if self._sensors is not None else "none"
+
+    def open(self) -> None:
+        """Build the scene. Raises `ConfigError` if EGL is asked for and this machine has none."""
+        with self._sensor_lock:
+            if self._sensors is None:
+                self._sensors = Sensors(self._profile, self.layout, self._renderer, self._seed)
+
+    def close(self) -> None:
+        """Stop, and let go of the scene. May be called twice."""
+        with self._lock:
+            self._body.command(STOP)
+        with self._sensor_lock:
+            if self._sensors is not None:
+                self._sensors.close()
+                self._sensors = None
+
+    def now(self) -> float:
+        """Simulated seconds since the twin was made."""
+        if self._factor is None:
+            return self._body.time_s
+        return (time.monotonic() - self._began_s) * self._factor
+
+    def wait(self, until_s: float) -> None:
+        """Let simulated time pass until `until_s`."""
+        if self._factor is not None:
+            time.sleep(max(until_s - self.now(), 0.0) / self._factor)
+            until_s = self.now()
+        with self._lock:
+            self._body.advance(until_s)
+
+    def drive(self, command: Command) -> Applied:
+        """Set the target of the base; what is not finite is refused and stops it."""
+        with self._lock:
+            self._body.advance(self.now())
+            stamp_s = self._body.time_s
+            applied = judge_command(command, self._profile.base, stamp_s)
+            self._body.command(applied.twist)
+        return applied
+
+    def read(self) -> Observation:
+        """Capture every sensor whose period has passed, and return the newest of each."""
+        with self._sensor_lock:
+            if self._sensors is None:
+                raise DeviceError("the twin is not open", "Call open() first.")
+            with self._lock:
+                self._body.advance(self.now())
+                now_s, motion, odom = self._body.time_s, self._body.motion, self._body.measured()
+            last = self._newest
+            image, scan = self._sensors.image(motion, now_s), self._sensors.scan(motion, now_s)
+            if last is not None:
+                if last.odom is not None and now_s - last.odom.stamp_s < ODOMETRY_PERIOD_S - ROUNDING_S:
+                    odom = last.odom
+                stepped = self._factor is None and now_s > last.stamp_s
+                if image is last.image and scan is last.scan and odom is last.odom and not stepped:
+                    return last
+            self._seq += 1
+            self._newest = Observation(self._seq, now_s, scan=scan, image=image, odom=odom)
+            return self._newest
+
+    def reset(self, episode: Episode) -> None:
+        """Put the robot down anew; a new layout only moves the boxes. Time goes on."""
+        with self._sensor_lock, self._lock:
+            self._body.advance(self.now())
+            if episode.layout != self.layout.seed:
+                self._body.course = Course(build(self.world, episode.layout), self._body.course.radius_m)
+                if self._sensors is not None:
+                    self._sensors.arrange(self.layout)
+            self._body.put_down(episode.start_m, episode.lateral_m, episode.yaw_rad)
+            self._forget()
+
+    def place(self, state: CourseState) -> None:
+        """Put the robot into exactly this state, on the present layout. For looking ahead, see `foresight`."""
+        with self._sensor_lock, self._lock:
+            self._body.advance(self.now())
+            self._body.place(state)
+            self._forget()
+
+    def state(self) -> CourseState:
+        """Ground truth now."""
+        with self._lock:
+            self._body.advance(self.now())
+            return self._body.state()
+
+    def _forget(self) -> None:
+        self._newest = None
+        if self._sensors is not None:
+            self._sensors.forget()
+
+
+def judge_command(command: Command, base: Base, stamp_s: float) -> Applied:
+    """Clamp to the profile's limits; refuse what is not finite."""
+    asked = command.twist
+    age_s = stamp_s - command.stamp_s
+    if not (math.isfinite(asked.linear_m_s) and math.isfinite(asked.angular_rad_s)):
+        return Applied(STOP, stamp_s, Source.NONE, Reason.REFUSED, (), command.answers, age_s)
+    twist = Twist(
+        min(max(asked.linear_m_s, -base.max_linear_m_s), base.max_linear_m_s),
+        min(max(asked.angular_rad_s, -base.max_angular_rad_s), base.max_angular_rad_s),
+    )
+    pairs = {"linear": (twist.linear_m_s, asked.linear_m_s), "angular": (twist.angular_rad_s, asked.angular_rad_s)}
+    clamps = tuple(name for name, (got, wanted) in pairs.items() if got != wanted)
+    return Applied(twist, stamp_s, command.source, Reason.OK, clamps, command.answers, age_s)

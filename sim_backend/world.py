@@ -1,0 +1,191 @@
+"""A world as data: a TOML file says what lies on the floor. What is random in it is drawn in `layout.py`.
+
+Angles are in degrees in the file, because people write it by hand; everything that leaves `layout.py` is SI.
+"""
+
+import math
+from importlib import resources
+from pathlib import Path
+from typing import Annotated
+
+import msgspec
+from msgspec import Meta
+
+from hal.config import Table, load_toml
+from hal.errors import ConfigError
+from hal.profile import Count, NotNegative, Positive
+
+Gray = Annotated[int, Meta(ge=0, le=255)]
+Share = Annotated[float, Meta(ge=0.0, le=1.0)]
+
+# A line that is said to close may miss its own beginning by rounding in the file, no more.
+CLOSING_M = 0.05
+CLOSING_DEG = 1.0
+
+
+class Start(Table, frozen=True):
+    """Where the robot starts and where the line begins."""
+
+    x_m: float = 0.0
+    y_m: float = 0.0
+    yaw_deg: float = 0.0
+
+
+class Piece(Table, frozen=True):
+    """A straight (`straight_m`) or an arc (`radius_m` and `angle_deg`, positive to the left)."""
+
+    straight_m: Positive | None = None
+    radius_m: Positive | None = None
+    angle_deg: Annotated[float, Meta(ge=-360.0, le=360.0)] | None = None
+
+    def __post_init__(self) -> None:
+        """Accept exactly one of the two kinds."""
+        arc = self.radius_m is not None and self.angle_deg is not None
+        half = (self.radius_m is None) != (self.angle_deg is None)
+        if half or arc == (self.straight_m is not None):
+            raise ValueError("a piece is either straight_m, or radius_m together with angle_deg")
+        if self.angle_deg == 0.0:
+            raise ValueError("an arc of angle_deg = 0 is not an arc: use straight_m")
+
+    @property
+    def length_m(self) -> float:
+        """Length along the piece."""
+        if self.straight_m is not None:
+            return self.straight_m
+        return (self.radius_m or 0.0) * abs(math.radians(self.angle_deg or 0.0))
+
+
+class Line(Table, frozen=True):
+    """A line painted on the floor, beginning at `start`. `pieces` are laid end to end, `repeat` times."""
+
+    pieces: Annotated[tuple[Piece, ...], Meta(min_length=1)]
+    repeat: Count = 1
+    closed: bool = False
+    width_m: Positive = 0.1
+    gray: Gray = 0
+
+
+class Box(Table, frozen=True):
+    """A box standing on the floor."""
+
+    x_m: float
+    y_m: float
+    yaw_deg: float = 0.0
+    length_m: Positive = 0.45
+    width_m: Positive = 0.45
+    height_m: Positive = 0.45
+    gray: Gray = 0
+
+
+class Along(Table, frozen=True):
+    """Cubes scattered along the line, at least `spacing_m` from centre to centre along it.
+
+    A share `on` of them stands on the line, up to `on_lateral_m` off its middle; the rest beside it, with the centre
+    `beside_m` = [nearest, farthest] to either side. `clear_m` of line stay free at the start (and before a closed
+    line's end, which is the same place).
+    """
+
+    count: Count
+    spacing_m: Positive = 4.0
+    clear_m: NotNegative = 4.0
+    on: Share = 1.0
+    on_lateral_m: NotNegative = 0.0
+    beside_m: tuple[Positive, Positive] = (0.5, 1.0)
+    size_m: Positive = 0.45
+    gray: Gray = 0
+
+    def __post_init__(self) -> None:
+        """Refuse an empty lateral range."""
+        if self.beside_m[0] > self.beside_m[1]:
+            raise ValueError(f"beside_m = {list(self.beside_m)} must be [nearest, farthest]")
+
+
+class Area(Table, frozen=True):
+    """Cubes scattered over a rectangle, with at least `gap_m` of free floor between any two boxes.
+
+    `x_m` and `y_m` are [from, to]. From the near end to the far end in x the density grows from `sparse` times
+    the mean up to its mirror (1: even, 0: empty at the near end).
+    """
+
+    count: Count
+    x_m: tuple[float, float]
+    y_m: tuple[float, float]
+    gap_m: NotNegative = 0.8
+    sparse: Share = 1.0
+    size_m: Positive = 0.45
+    gray: Gray = 0
+
+    def __post_init__(self) -> None:
+        """Refuse an empty rectangle."""
+        for name, (low, high) in (("x_m", self.x_m), ("y_m", self.y_m)):
+            if low >= high:
+                raise ValueError(f"{name} = {[low, high]} must be [from, to] with from < to")
+
+
+class Limits(Table, frozen=True):
+    """When a drive is lost or finished.
+
+    With a line: lost when farther than `lost_m` from it, finished after `laps` of a closed line or at `finish_m`
+    along an open one. Without a line both are measured from the straight ahead of the start.
+    """
+
+    lost_m: Positive
+    laps: Count = 1
+    finish_m: Positive | None = None
+
+
+class World(Table, frozen=True):
+    """A whole world. `name` is filled in from the file's name."""
+
+    description: str
+    limits: Limits
+    name: str = ""
+    ground_gray: Gray = 180
+    sky_gray: Gray = 230
+    start: Start = Start()
+    line: Line | None = None
+    box: tuple[Box, ...] = ()
+    along: tuple[Along, ...] = ()
+    area: tuple[Area, ...] = ()
+
+    def __post_init__(self) -> None:
+        """Check what no single table can: raises `ValueError`, which loading turns into a `ConfigError`."""
+        if self.line is None and self.along:
+            raise ValueError("`along` scatters boxes along a line, and this world has no `line`")
+        closed = self.line is not None and self.line.closed
+        if not closed and self.limits.finish_m is None:
+            raise ValueError("limits.finish_m is needed unless the line is closed")
+        if closed and self.limits.finish_m is not None:
+            raise ValueError("limits.finish_m is for an open line; a closed one finishes after limits.laps")
+
+
+def known_worlds() -> list[str]:
+    """Names of the worlds that come with the project."""
+    folder = resources.files("sim_backend") / "worlds"
+    return sorted(entry.name.removesuffix(".toml") for entry in folder.iterdir() if entry.name.endswith(".toml"))
+
+
+def load_world(name_or_path: str) -> World:
+    """Load a world by name, or a user's own by the path of its TOML file.
+
+    Raises `ConfigError` for an unknown name, an unknown key, a value out of range, a line that does not close
+    or a box on the start.
+    """
+    # Here and not above: a layout is built from a world, and only loading looks back from one to the other.
+    from sim_backend.layout import check
+
+    if name_or_path.endswith(".toml"):
+        path = Path(name_or_path)
+    elif name_or_path in known_worlds():
+        path = Path(str(resources.files("sim_backend") / "worlds" / f"{name_or_path}.toml"))
+    else:
+        raise ConfigError(
+            f"unknown world '{name_or_path}'",
+            f"Known worlds: {', '.join(known_worlds())}; or give the path of a .toml file.",
+        )
+    world = msgspec.structs.replace(load_toml(path, World), name=path.stem)
+    try:
+        check(world)
+    except ValueError as error:
+        raise ConfigError(f"{path}: {error}", "Mend the world file.") from error
+    return world
