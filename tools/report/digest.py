@@ -1,0 +1,123 @@
+"""The records of one run, sorted into laps: what every part of the page is drawn from."""
+
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from fusion.record import LapRecord, Record, ResultRecord, RunRecord, StepRecord, read_run
+from hal.errors import StorageError
+from hal.messages import Action
+
+PHASES = {"train": "Training lap", "prove": "Proving run", "unseen": "Unseen layout"}
+
+
+@dataclass(frozen=True, slots=True)
+class Lap:
+    """The steps of one lap in order; `record` is None for a lap that was cut off."""
+
+    phase: str
+    number: int
+    layout: int
+    steps: tuple[StepRecord, ...]
+    record: LapRecord | None = None
+
+    @property
+    def title(self) -> str:
+        """Name for headings: a training lap by its number, the others by what they prove."""
+        name = PHASES.get(self.phase, self.phase)
+        return f"{name} {self.layout}" if self.phase == "unseen" else f"{name} {self.number}"
+
+    @property
+    def began_s(self) -> float:
+        """Robot time of the first step."""
+        return self.steps[0].decision.stamp_s if self.steps else 0.0
+
+    @property
+    def duration_s(self) -> float:
+        """Robot time from the first step to the last."""
+        return self.steps[-1].decision.stamp_s - self.began_s if self.steps else 0.0
+
+
+@dataclass(frozen=True, slots=True)
+class Run:
+    """One run: how it began, its laps, how it ended (None: it was cut off)."""
+
+    head: RunRecord | None
+    laps: tuple[Lap, ...]
+    result: ResultRecord | None
+    experts: tuple[str, ...]
+
+    def phase(self, name: str) -> list[Lap]:
+        """Laps of one phase."""
+        return [lap for lap in self.laps if lap.phase == name]
+
+    def steps(self) -> Iterator[tuple[Lap, StepRecord]]:
+        """All steps, each with its lap."""
+        return ((lap, step) for lap in self.laps for step in lap.steps)
+
+    def labels(self) -> dict[str, list[Action]]:
+        """Actions of the stored labels by source: "human" and "expert" (one expert's, or the mean of several)."""
+        actions: dict[str, list[Action]] = {"human": [], "expert": []}
+        for _, step in self.steps():
+            if step.label is not None:
+                actions["human" if step.label == "human" else "expert"].append(step.decision.executed)
+        return actions
+
+
+@dataclass(slots=True)
+class _Sorter:
+    """Collects records; a lap ends with its `LapRecord` or with the first step of another lap."""
+
+    head: RunRecord | None = None
+    result: ResultRecord | None = None
+    laps: list[Lap] = field(default_factory=list)
+    steps: list[StepRecord] = field(default_factory=list)
+
+    def add(self, record: Record) -> None:
+        match record:
+            case RunRecord():
+                # A file that was appended to holds several runs: the last one counts.
+                self.head, self.result, self.laps, self.steps = record, None, [], []
+            case StepRecord():
+                if self.steps and _key(self.steps[-1]) != _key(record):
+                    self.end_lap(None)
+                self.steps.append(record)
+            case LapRecord():
+                self.end_lap(record)
+            case ResultRecord():
+                self.result = record
+
+    def end_lap(self, record: LapRecord | None) -> None:
+        if record is not None:
+            phase, number, layout = record.phase, record.lap, record.layout
+        elif self.steps:
+            phase, number, layout = _key(self.steps[0])
+        else:
+            return
+        self.laps.append(Lap(phase, number, layout, tuple(self.steps), record))
+        self.steps = []
+
+
+def _key(step: StepRecord) -> tuple[str, int, int]:
+    return step.decision.phase, step.decision.lap, step.layout
+
+
+def digest(records: Iterable[Record]) -> Run:
+    """Sort records into laps."""
+    sorter = _Sorter()
+    for record in records:
+        sorter.add(record)
+    sorter.end_lap(None)
+    experts: dict[str, None] = {}
+    for lap in sorter.laps:
+        for step in lap.steps[:1]:
+            experts |= dict.fromkeys(view.name for view in step.decision.experts)
+    return Run(sorter.head, tuple(sorter.laps), sorter.result, tuple(experts))
+
+
+def load_run(path: Path) -> Run:
+    """Read and digest a run record. Raises `StorageError` where there is none or nothing in it."""
+    run = digest(read_run(path))
+    if run.head is None and not run.laps:
+        raise StorageError(f"{path} holds no step yet", "Let the run go on for a moment, then try again.")
+    return run

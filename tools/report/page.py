@@ -1,0 +1,245 @@
+"""The page itself: sections of HTML around the drawings. Style, drawings and pictures are all inside."""
+
+import base64
+import math
+from collections.abc import Iterable, Sequence
+from html import escape
+from importlib import resources
+
+import cv2
+import numpy as np
+
+from tools.report import plots
+from tools.report.course import course
+from tools.report.digest import Lap, Run
+
+TRAINING_VIEWS = 6
+PICTURES = 24
+
+
+def render(run: Run) -> str:
+    """Return the whole page."""
+    title = f"{method_name(run)} on {run.head.world}" if run.head else "A run"
+    style = (resources.files("tools") / "report" / "page.css").read_text(encoding="utf-8")
+    sections = [head(run, title), lap_table(run), top_views(run), strips(run), densities(run), pictures(run)]
+    return (
+        '<!doctype html>\n<html lang="en"><head><meta charset="utf-8">'
+        '<meta name="viewport" content="width=device-width, initial-scale=1">'
+        f"<title>{escape(title)}</title><style>{style}</style></head>\n<body>{''.join(sections)}</body></html>\n"
+    )
+
+
+def method_name(run: Run) -> str:
+    """Spell the method as the thesis does."""
+    method = run.head.method if run.head else ""
+    return {"lira": "LIRA-SPF", "hg-dagger": "HG-DAgger"}.get(method, method)
+
+
+def head(run: Run, title: str) -> str:
+    """What was run, how it ended, and the command that repeats it."""
+    words, css = outcome(run)
+    parts = [f'<h1>{escape(title)}</h1><p class="outcome {css}">{escape(words)}</p>']
+    if run.head:
+        facts = [
+            f"robot profile {run.head.profile}",
+            f"preset {run.head.preset}",
+            f"layout {run.head.layout}",
+            f"seed {run.head.seed}",
+            f"version {run.head.version}",
+        ]
+        parts.append(f'<p class="muted">{escape(" · ".join(facts))}</p>')
+    parts.append(f'<dl class="tiles">{"".join(map(tile, figures(run)))}</dl>')
+    unseen = [lap.record for lap in run.phase("unseen") if lap.record]
+    if unseen:
+        passed = sum(record.passed for record in unseen)
+        harm = f"collisions: {sum(r.collisions for r in unseen)}, lost lines: {sum(r.lost for r in unseen)}"
+        parts.append(f"<p>The novice alone on layouts it has not seen: {passed} of {len(unseen)} passed ({harm}).</p>")
+    if run.head:
+        parts.append(f"<p>To repeat it:</p><pre>{escape(run.head.command)}</pre>")
+    return "".join(parts)
+
+
+def outcome(run: Run) -> tuple[str, str]:
+    """One line for the end of the run, and its style."""
+    if run.result is None:
+        return "Cut off before its end", "bad"
+    laps = f"{run.result.laps} training lap{'s' if run.result.laps != 1 else ''}"
+    if run.result.converged:
+        return f"Converged after {laps}: the novice alone passed its proving run", "good"
+    return f"Did not converge within {laps} (censored)", "bad"
+
+
+def figures(run: Run) -> Iterable[tuple[str, str]]:
+    """Name and value of the numbers at the top."""
+    if run.result:
+        result = run.result
+        yield "human labels", str(result.human_labels)
+        yield "demonstration", f"{result.demonstration} labels"
+        yield "interventions", str(result.interventions)
+        yield "calls", str(result.calls)
+        yield "buffer", str(result.buffer)
+        yield "training steps", str(result.training_steps)
+        yield "simulated time", clock(result.simulated_s)
+        if result.elapsed_s > 0:
+            yield "times real time", f"{result.simulated_s / result.elapsed_s:.0f}"
+    training = run.phase("train")
+    alone = [lap.number for lap in training if lap.record and lap.record.unassisted]
+    if training:
+        yield "lap without help", f"lap {alone[0]}" if alone else "none"
+
+
+def tile(figure: tuple[str, str]) -> str:
+    """One number at the top."""
+    name, value = figure
+    return f"<div><dt>{escape(name)}</dt><dd>{escape(value)}</dd></div>"
+
+
+def clock(seconds: float) -> str:
+    """Minutes and seconds."""
+    return f"{int(seconds) // 60}:{int(seconds) % 60:02d}"
+
+
+def lap_table(run: Run) -> str:
+    """One row per lap."""
+    names = (
+        *("lap", "layout", "passed", "without human", "time", "collisions", "line lost", "off line, rms"),
+        *("human labels", "interventions", "calls", "buffer", "training steps"),
+    )
+    rows = []
+    for lap in run.laps:
+        if lap.record is None:
+            cells = [lap.title, str(lap.layout), "cut off", *[""] * (len(names) - 3)]
+        else:
+            record = lap.record
+            off = "" if record.lateral_rms_m is None or math.isnan(record.lateral_rms_m) else record.lateral_rms_m
+            cells = [
+                lap.title,
+                str(record.layout),
+                "yes" if record.passed else "no",
+                "yes" if record.unassisted else "no",
+                clock(record.duration_s),
+                str(record.collisions),
+                str(record.lost),
+                f"{off:.2f} m" if off != "" else "",
+                *map(str, (record.human_labels, record.interventions, record.calls, record.buffer)),
+                str(record.training_steps),
+            ]
+        rows.append("<tr>" + "".join(f"<td>{escape(cell)}</td>" for cell in cells) + "</tr>")
+    header = "".join(f"<th>{escape(name)}</th>" for name in names)
+    note = "Labels, interventions, calls, buffer and training steps are totals since the run began."
+    return section("Laps", note, f'<div class="scroll"><table><tr>{header}</tr>{"".join(rows)}</table></div>')
+
+
+def top_views(run: Run) -> str:
+    """Where each lap went: training, the last proving run, every unseen layout."""
+    training = run.phase("train")
+    if len(training) > TRAINING_VIEWS:
+        training = training[: TRAINING_VIEWS // 2] + training[-(TRAINING_VIEWS // 2) :]
+    laps = [*training, *run.phase("prove")[-1:], *run.phase("unseen")]
+    figures = []
+    for lap in laps:
+        floor = course(run.head.world, lap.layout) if run.head else course("", lap.layout)
+        drawn, wide = plots.top_view(lap, floor, run.experts)
+        if drawn:
+            css = ' class="wide"' if wide else ""
+            figures.append(
+                f'<figure{css}><div class="view">{drawn}</div><figcaption>{caption(lap)}</figcaption></figure>'
+            )
+    if not figures:
+        return section("Where it drove", "No ground truth in this record: only a twin knows where the robot is.", "")
+    note = "One dot per decision: close dots mean slow. ● start. ✕ collision or lost line: put back and driven on."
+    return section("Where it drove", note, legend(run) + f'<div class="views">{"".join(figures)}</div>')
+
+
+def caption(lap: Lap) -> str:
+    """Name of a lap and how it went."""
+    if lap.record is None:
+        return f"<b>{escape(lap.title)}</b> · cut off"
+    verdict = '<span class="good">passed</span>' if lap.record.passed else '<span class="bad">not passed</span>'
+    harm = f" · collisions: {lap.record.collisions}, lost lines: {lap.record.lost}" if not lap.record.passed else ""
+    return f"<b>{escape(lap.title)}</b> · {verdict}{harm}"
+
+
+def drivers(run: Run) -> list[tuple[str, str]]:
+    """Who drove in this run: words for the legend and the style's name."""
+    seen = {step.decision.driver for _, step in run.steps()}
+    known = [("novice", "novice"), ("human", "human"), *((name, f"{name} expert") for name in run.experts)]
+    known.append(("mean", "mean of the experts"))
+    return [(words, plots.driver_class(name, run.experts)) for name, words in known if name in seen]
+
+
+def legend(run: Run, more: Sequence[tuple[str, str]] = ()) -> str:
+    """Colours and what they mean."""
+    keys = [(words, f"var(--{css})") for words, css in drivers(run)] + list(more)
+    return '<div class="legend">' + "".join(key(*entry) for entry in keys) + "</div>"
+
+
+def key(words: str, colour: str) -> str:
+    """One entry of a legend."""
+    return f'<span style="--key:{colour}">{escape(words)}</span>'
+
+
+def strips(run: Run) -> str:
+    """Who drove when, one strip per lap."""
+    laps = [lap for lap in run.laps if lap.steps]
+    if not laps:
+        return ""
+    longest_s = max(1.0, *(lap.duration_s for lap in laps))
+    rows = [f"<span>{escape(lap.title)}</span>{plots.strip(lap, run.experts, longest_s)}" for lap in laps]
+    ticks = "".join(
+        f'<span style="left:{100 * seconds / longest_s:.1f}%">{clock(seconds)}</span>'
+        for seconds in range(0, int(longest_s) + 1, plots.nice_step(longest_s))
+    )
+    colours = legend(run, [("attention call", "var(--muted)"), ("feedback call", "var(--ink)")])
+    note = "The thin bar under each strip shows when the robot called: for attention, or for feedback."
+    axis = f'<span></span><div class="axis">{ticks}</div>'
+    return section("Who drove when", note, f'{colours}<div class="strips">{"".join(rows)}{axis}</div>')
+
+
+def densities(run: Run) -> str:
+    """Label densities by source (thesis, figure E.4)."""
+    labels = run.labels()
+    colours = "".join(
+        [
+            key(f"human ({len(labels['human'])} labels)", "var(--human)"),
+            key(f"experts ({len(labels['expert'])} labels)", "var(--e1)"),
+        ]
+    )
+    linear = plots.density(labels, 0, "Linear velocity", ("-1: full speed back", "1: full speed ahead"))
+    angular = plots.density(labels, 1, "Angular velocity", ("-1: full right", "1: full left"))
+    note = "Labels in the buffer by action, as a share of the robot's limits, and by who gave them (thesis, fig. E.4)."
+    body = f'<div class="legend">{colours}</div><div class="pair">{linear}{angular}</div>'
+    return section("What it learned from", note, body)
+
+
+def pictures(run: Run) -> str:
+    """What the camera saw when the robot called; evenly chosen when there are many."""
+    calls = [(lap, step) for lap, step in run.steps() if step.image]
+    chosen = calls
+    if len(calls) > PICTURES:
+        chosen = [calls[index * len(calls) // PICTURES] for index in range(PICTURES)]
+    figures = []
+    for lap, step in chosen:
+        colour = "var(--ink)" if step.decision.call == "feedback" else "var(--muted)"
+        when = f"{step.decision.stamp_s - lap.began_s:.1f} s"
+        figures.append(
+            f'<figure style="--key:{colour}"><img alt="camera at a call" src="{png(step.image or b"")}">'
+            f"<figcaption>{escape(step.decision.call)}<br>"
+            f'<span class="muted">lap {lap.number}, {when}</span></figcaption></figure>'
+        )
+    note = f"The camera's 32x32 gray image, as the networks get it. {len(chosen)} of {len(calls)} calls."
+    if not figures:
+        return section("What it saw when it called", "It never called.", "")
+    return section("What it saw when it called", note, f'<div class="calls">{"".join(figures)}</div>')
+
+
+def png(image: bytes) -> str:
+    """Encode square gray pixels as a data URI."""
+    side = math.isqrt(len(image))
+    _, data = cv2.imencode(".png", np.frombuffer(image[: side * side], dtype=np.uint8).reshape(side, side))
+    return "data:image/png;base64," + base64.b64encode(data.tobytes()).decode("ascii")
+
+
+def section(title: str, note: str, body: str) -> str:
+    """A heading, one line on how to read what follows, and that."""
+    return f'\n<h2>{escape(title)}</h2><p class="note">{escape(note)}</p>{body}'
