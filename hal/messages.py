@@ -146,6 +146,13 @@ class BatteryState:
 
 
 @dataclass(frozen=True, slots=True)
+class Clock:
+    """rosgraph_msgs/Clock: the robot's time. In lockstep it closes an observation: all its parts came before."""
+
+    stamp_s: float
+
+
+@dataclass(frozen=True, slots=True)
 class Observation:
     """The newest of every sensor at `stamp_s`; a sensor that is absent or stale is None.
 
