@@ -12,6 +12,7 @@ import numpy as np
 from tools.report import plots
 from tools.report.course import course
 from tools.report.digest import Lap, Run
+from tools.report.laps import COLUMNS, clock, lap_cells
 
 TRAINING_VIEWS = 6
 PICTURES = 24
@@ -94,40 +95,14 @@ def tile(figure: tuple[str, str]) -> str:
     return f"<div><dt>{escape(name)}</dt><dd>{escape(value)}</dd></div>"
 
 
-def clock(seconds: float) -> str:
-    """Minutes and seconds."""
-    return f"{int(seconds) // 60}:{int(seconds) % 60:02d}"
-
-
 def lap_table(run: Run) -> str:
     """One row per lap."""
-    names = (
-        *("lap", "layout", "passed", "without human", "time", "collisions", "line lost", "off line, rms"),
-        *("human labels", "interventions", "calls", "buffer", "training steps"),
+    header = "".join(f"<th>{escape(name)}</th>" for name in COLUMNS)
+    rows = "".join(
+        "<tr>" + "".join(f"<td>{escape(cell)}</td>" for cell in lap_cells(lap)) + "</tr>" for lap in run.laps
     )
-    rows = []
-    for lap in run.laps:
-        if lap.record is None:
-            cells = [lap.title, str(lap.layout), "cut off", *[""] * (len(names) - 3)]
-        else:
-            record = lap.record
-            off = "" if record.lateral_rms_m is None or math.isnan(record.lateral_rms_m) else record.lateral_rms_m
-            cells = [
-                lap.title,
-                str(record.layout),
-                "yes" if record.passed else "no",
-                "yes" if record.unassisted else "no",
-                clock(record.duration_s),
-                str(record.collisions),
-                str(record.lost),
-                f"{off:.2f} m" if off != "" else "",
-                *map(str, (record.human_labels, record.interventions, record.calls, record.buffer)),
-                str(record.training_steps),
-            ]
-        rows.append("<tr>" + "".join(f"<td>{escape(cell)}</td>" for cell in cells) + "</tr>")
-    header = "".join(f"<th>{escape(name)}</th>" for name in names)
     note = "Labels, interventions, calls, buffer and training steps are totals since the run began."
-    return section("Laps", note, f'<div class="scroll"><table><tr>{header}</tr>{"".join(rows)}</table></div>')
+    return section("Laps", note, f'<div class="scroll"><table><tr>{header}</tr>{rows}</table></div>')
 
 
 def top_views(run: Run) -> str:

@@ -1,0 +1,104 @@
+"""The demo's supervision, with stand-ins for the twin and the learner. The real ones have their end-to-end test."""
+
+import os
+import signal
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from synthetic_run import write_run
+
+from hal.errors import ConfigError
+from tools.processes import ProcessError
+from tools.verbs import demo
+
+HERE = Path(__file__).parent
+TWIN = "import time; print(\"twin 'x' serves world 'line'\", flush=True); time.sleep(60)"
+
+
+def python(code):
+    return [sys.executable, "-c", code]
+
+
+def learner(folder, *, converged=True):
+    """Return the command of a process that writes a whole run."""
+    code = f"""
+import sys, pathlib
+sys.path.insert(0, {str(HERE)!r})
+from synthetic_run import write_run
+path = write_run(pathlib.Path({str(folder)!r}), unseen=1)
+if not {converged}:
+    path.write_bytes(path.read_bytes().replace(b'"converged":true', b'"converged":false'))
+"""
+    return python(code)
+
+
+@pytest.fixture(autouse=True)
+def _keep_signals():
+    before = signal.getsignal(signal.SIGTERM)
+    yield
+    signal.signal(signal.SIGTERM, before)
+
+
+def test_a_run_that_converges_exits_0_with_its_report(tmp_path, capsys):
+    assert demo.supervise(python(TWIN), learner(tmp_path), tmp_path) == 0
+    out = capsys.readouterr().out
+    assert out.startswith("twin 'x' serves world")
+    assert "alone on unseen layouts: 1 of 1 passed, 0 collisions" in out
+    assert out.splitlines()[-1] == f"report: {tmp_path / 'report.html'}"
+    assert (tmp_path / "report.html").exists()
+
+
+def test_a_run_that_does_not_converge_exits_1_and_still_reports(tmp_path, capsys):
+    assert demo.supervise(python(TWIN), learner(tmp_path, converged=False), tmp_path) == 1
+    assert "did not pass its proving run" in capsys.readouterr().out
+    assert (tmp_path / "report.html").exists()
+
+
+def test_a_twin_that_dies_is_named_and_quoted(tmp_path):
+    twin = python("import time; print('serves world', flush=True); time.sleep(0.3); raise SystemExit('no floor')")
+    with pytest.raises(ProcessError, match=r"(?s)the twin ended with status 1.*no floor") as error:
+        demo.supervise(twin, python("import time; time.sleep(60)"), tmp_path)
+    assert str(tmp_path / "twin.log") in error.value.remedy
+
+
+def test_a_learner_that_dies_is_named_and_quoted(tmp_path):
+    with pytest.raises(ProcessError, match=r"(?s)the learner ended with status 3.*boom"):
+        demo.supervise(python(TWIN), python("print('boom'); raise SystemExit(3)"), tmp_path)
+
+
+def test_a_standstill_is_an_error(tmp_path, monkeypatch):
+    monkeypatch.setattr(demo, "STALL_S", 0.5)
+    with pytest.raises(ProcessError, match="nothing has happened"):
+        demo.supervise(python(TWIN), python("import time; time.sleep(60)"), tmp_path)
+
+
+def test_an_earlier_run_is_not_touched(tmp_path):
+    before = write_run(tmp_path, unseen=0).read_bytes()
+    with pytest.raises(ConfigError, match="already holds a run"):
+        demo.supervise(python(TWIN), learner(tmp_path), tmp_path)
+    assert (tmp_path / "run.jsonl").read_bytes() == before
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_ending_the_demo_ends_its_processes(tmp_path, number):
+    pids = tmp_path / "pids"
+    child = f"import os, time; open({str(pids)!r}, 'a').write(f'{{os.getpid()}}\\n'); "
+    child += "print('serves world', flush=True); time.sleep(60)"
+    code = f"""
+import pathlib, sys
+from tools.verbs.demo import supervise
+try:
+    supervise([sys.executable, "-c", {child!r}], [sys.executable, "-c", {child!r}], pathlib.Path({str(tmp_path)!r}))
+except KeyboardInterrupt:
+    sys.exit(130)
+"""
+    with subprocess.Popen(python(code)) as parent:
+        while len(pids.read_text().split() if pids.exists() else []) < 2:
+            assert parent.poll() is None
+        parent.send_signal(number)
+        assert parent.wait(30) == 130
+    for pid in map(int, pids.read_text().split()):
+        with pytest.raises(ProcessLookupError):
+            os.kill(pid, 0)

@@ -1,0 +1,130 @@
+"""Watch a robot learn: the digital twin and the learner in two processes, over the same bus that drives the real robot.
+
+A scripted teacher drives first. Then the experts drive where they agree, the teacher helps where they do not, and a
+network that sees both sensors learns from all of them. It has learned when it drives a lap alone; after that it drives
+layouts it has never seen. It all takes a few minutes and leaves report.html in the run's folder.
+
+examples:
+  lira demo
+  lira demo --seed 3 --unseen 5
+  lira demo --world race --laps 20 --run runs/race
+
+exit status: 0 if the robot learned to drive alone, 1 if it did not within its laps, 2 if something went wrong
+"""
+
+import argparse
+import signal
+import sys
+import time
+from datetime import datetime
+from pathlib import Path
+
+from hal.errors import ConfigError
+
+READY_S = 60.0
+POLL_S = 0.1
+STALL_S = 60.0
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the arguments."""
+    add = parser.add_argument
+    add("--world", default="line-obstacles", help="world by name or .toml file (default: %(default)s)")
+    add("--profile", default="thesis-sim", help="robot by name or .toml file (default: %(default)s)")
+    add("--seed", type=int, default=0, help="seeds teacher, training and noise (default: %(default)s)")
+    add("--layout", type=int, default=0, help="layout to learn on (default: %(default)s)")
+    add("--laps", type=int, default=12, help="give up after so many training laps (default: %(default)s)")
+    add("--unseen", type=int, default=3, help="unseen layouts to drive afterwards (default: %(default)s)")
+    add("--run", type=Path, metavar="DIR", help="folder of the run (default: runs/demo-<date-time>)")
+
+
+def run(args: argparse.Namespace) -> int:
+    """Run the demo from start to report."""
+    from hal.profile import load_profile
+    from sim_backend.world import load_world
+    from tools.processes import free_port, lira_command
+
+    load_profile(args.profile)  # what cannot work is refused before anything starts
+    load_world(args.world)
+    folder: Path = args.run or Path("runs") / f"demo-{datetime.now():%Y%m%d-%H%M%S}"
+    port = free_port()
+    name, endpoint = f"demo-{port}", f"tcp/127.0.0.1:{port}"
+    both = ["--name", name, "--layout", str(args.layout), "--seed", str(args.seed)]
+    twin = ["--world", args.world, "--profile", args.profile, "--listen", endpoint, "--lockstep"]
+    fusion = ["--connect", endpoint, "--method", "lira", "--teacher", "scripted", "--run", str(folder)]
+    fusion += ["--train-laps", str(args.laps), "--unseen", str(args.unseen)]
+    return supervise(lira_command("twin", *both, *twin), lira_command("fusion", *both, *fusion), folder)
+
+
+def supervise(twin_command: list[str], fusion_command: list[str], folder: Path) -> int:
+    """Run both processes, show how they get on, stop them, and write the report. Returns the exit status.
+
+    Raises `ProcessError` when one of them dies.
+    """
+    from tools.report import RECORD
+
+    if (folder / RECORD).exists():
+        raise ConfigError(f"{folder} already holds a run", "Choose another folder with --run.")
+    signal.signal(signal.SIGTERM, signal.default_int_handler)  # whoever ends the demo ends its processes
+    try:
+        watch(twin_command, fusion_command, folder)
+    except KeyboardInterrupt:
+        if (folder / RECORD).exists():
+            print(f"stopped; what was learned so far: lira report {folder}")
+        raise
+    return conclude(folder)
+
+
+def watch(twin_command: list[str], fusion_command: list[str], folder: Path) -> None:
+    """Start the twin, then the learner; show progress until the learner has ended by itself."""
+    from tools.processes import ChildProcess, ProcessError
+    from tools.progress import Display, Progress, Tail
+    from tools.report import RECORD
+
+    display, progress, tail = Display(sys.stdout), Progress(), Tail(folder / RECORD)
+    # The learner is left first, so it is stopped first: the twin sees it off.
+    with (
+        ChildProcess("the twin", twin_command, folder / "twin.log") as twin,
+        ChildProcess("the learner", fusion_command, folder / "fusion.log") as fusion,
+    ):
+        try:
+            display.keep(twin.wait_ready("serves world", READY_S))
+            ended, newest_s = False, time.monotonic()
+            while not ended:
+                ended = fusion.wait(POLL_S) is not None  # asked before reading: what it wrote is all there
+                for record in tail.read():
+                    newest_s = time.monotonic()
+                    line = progress.note(record)
+                    if line is not None:
+                        display.keep(line)
+                display.status(progress.status())
+                if not ended and twin.status() is not None:
+                    raise twin.failure()
+                if time.monotonic() - newest_s > STALL_S:
+                    raise ProcessError(
+                        f"nothing has happened for {STALL_S:.0f} s; the learner wrote:\n{fusion.tail()}",
+                        f"All that both wrote: {fusion.log} and {twin.log}",
+                    )
+        finally:
+            display.close()
+        if progress.result is None:
+            raise (fusion if twin.status() is None else twin).failure()
+
+
+def conclude(folder: Path) -> int:
+    """Print the table, write the report, and return 0 if the novice learned to drive alone."""
+    from tools.report import RECORD, write_report
+    from tools.report.digest import load_run
+    from tools.report.laps import COLUMNS, lap_cells
+    from tools.table import format_table
+
+    run = load_run(folder / RECORD)
+    print(f"\n{format_table(COLUMNS, [lap_cells(lap) for lap in run.laps])}\n")
+    unseen = [lap.record for lap in run.phase("unseen") if lap.record is not None]
+    if unseen:
+        passed, collisions = sum(lap.passed for lap in unseen), sum(lap.collisions for lap in unseen)
+        print(f"alone on unseen layouts: {passed} of {len(unseen)} passed, {collisions} collisions")
+    converged = run.result is not None and run.result.converged
+    print("the novice drives alone" if converged else "the novice did not pass its proving run")
+    print(f"report: {write_report(folder)}")
+    return 0 if converged else 1
