@@ -1,15 +1,15 @@
 """One training step as in the thesis: 50 minibatch updates of 32 labels, Adam, mean squared error, warm start."""
 
+import copy
 from dataclasses import dataclass
 
 import numpy as np
 import torch
 from torch import Tensor
 
-from fusion.networks import Network, Weights
+from fusion.networks import CameraTrunk, LidarTrunk, Network, Weights as Weights
+from fusion.preprocess import to_uint8
 from hal.messages import Action, FloatArray
-
-GRAY_LEVELS = 255
 
 
 @dataclass(frozen=True, slots=True)
@@ -24,10 +24,11 @@ class Label:
 
 
 class Learner:
-    """Trains a network on the labels it has been given. Deterministic for one seed and one number of threads.
+    """Trains a copy of a network on the labels it has been given.
 
-    Labels are kept once, in growing arrays: with `frozen_trunks` as the trunk's output, which is then never computed
-    again, otherwise as the scan and an 8-bit image, which is what the camera gave.
+    Deterministic for one seed, one number of threads and one kind of processor. Labels are kept once, in growing
+    arrays: with `frozen_trunks` as the trunk's output, which is then never computed again, otherwise as the scan and
+    an 8-bit image, which is what the camera gave.
     """
 
     def __init__(
@@ -40,13 +41,18 @@ class Learner:
         seed: int,
         frozen_trunks: bool,
     ) -> None:
-        self.network = network
-        self.frozen_trunks = frozen_trunks
+        self._network = copy.deepcopy(network).requires_grad_(True)
+        for trunk in self._network.modules():
+            if frozen_trunks and isinstance(trunk, CameraTrunk | LidarTrunk):
+                trunk.requires_grad_(False)
+            elif isinstance(trunk, CameraTrunk):
+                trunk.reduced_precision = _has_bfloat16()
+        self._frozen_trunks = frozen_trunks
         self._batch, self._updates = batch, updates
         self._random = np.random.default_rng(seed)
         self._inputs: list[_Rows] = []
         self._targets = _Rows((3,), torch.float32)  # linear, angular, weight
-        trained = [parameter for parameter in network.parameters() if parameter.requires_grad]
+        trained = [parameter for parameter in self._network.parameters() if parameter.requires_grad]
         self._adam = torch.optim.Adam(trained, lr=learning_rate, fused=True)
 
     def __len__(self) -> int:
@@ -55,11 +61,11 @@ class Learner:
     def add(self, label: Label) -> None:
         """Keep one label."""
         scan, image = torch.from_numpy(label.scan), torch.from_numpy(label.image)
-        if self.frozen_trunks:
+        if self._frozen_trunks:
             with torch.inference_mode():
-                rows = [self.network.features(scan[None], image[None])[0]]
+                rows = [self._network.features(scan[None], image[None])[0]]
         else:
-            rows = [scan, (image * GRAY_LEVELS).round().to(torch.uint8)]
+            rows = [scan, torch.from_numpy(to_uint8(label.image))]
         if not self._inputs:
             self._inputs = [_Rows(tuple(row.shape), row.dtype) for row in rows]
         for store, row in zip(self._inputs, rows, strict=True):
@@ -75,20 +81,26 @@ class Learner:
 
     def weights(self) -> Weights:
         """Copy the network's weights."""
-        return self.network.weights()
+        return self._network.weights()
 
     def _update(self, pick: Tensor) -> float:
         inputs = [store.rows[pick] for store in self._inputs]
-        if self.frozen_trunks:
-            actions = self.network.head(inputs[0])
+        if self._frozen_trunks:
+            actions = self._network.head(inputs[0])
         else:
-            actions = self.network(inputs[0], inputs[1].to(torch.float32) / GRAY_LEVELS)
+            actions = self._network(inputs[0], inputs[1].to(torch.float32) / 255)
         targets = self._targets.rows[pick]
         loss = ((actions - targets[:, :2]).square() * targets[:, 2:]).mean()
         self._adam.zero_grad()
         loss.backward()  # type: ignore[no-untyped-call]
         self._adam.step()
         return loss.item()
+
+
+def _has_bfloat16() -> bool:
+    """Whether the processor convolves in bfloat16 natively; elsewhere that is slower than float32."""
+    capable = torch.cpu.get_capabilities()
+    return bool(capable.get("avx512_bf16") or capable.get("amx_bf16"))
 
 
 class _Rows:

@@ -27,19 +27,26 @@ Weights = dict[str, NDArray[np.float32]]
 
 
 class CameraTrunk(nn.Module):
-    """conv3x3(f) -> conv3x3(f) -> maxpool 2. Image float32 [n, px, px] -> [n, size]."""
+    """conv3x3(f) -> conv3x3(f) -> maxpool 2. Image float32 [n, px, px] -> [n, size].
+
+    `reduced_precision`: convolve in bfloat16, which trains twice as fast on a processor that has it.
+    """
 
     def __init__(self, filters: int, px: int) -> None:
         super().__init__()
         self.filters, self.px = filters, px
+        self.reduced_precision = False
         self.conv1 = nn.Conv2d(1, filters, 3)
         self.conv2 = nn.Conv2d(filters, filters, 3)
         self.size = filters * ((px - 4) // 2) ** 2
+        self.to(memory_format=torch.channels_last)  # type: ignore[call-overload]
 
     def forward(self, image: Tensor) -> Tensor:
-        """Pool before the rectifier: it is monotonic, so the result is the same for a quarter of the work."""
-        hidden = leaky_relu(self.conv1(image.unsqueeze(1)), SLOPE)
-        return leaky_relu(max_pool2d(self.conv2(hidden), 2), SLOPE).flatten(1)
+        """Return the features of a batch of images."""
+        with torch.autocast("cpu", torch.bfloat16, enabled=self.reduced_precision):
+            hidden = leaky_relu(self.conv1(image.unsqueeze(1)), SLOPE, inplace=True)
+            # Pooled before the rectifier: it is monotonic, so the result is the same for a quarter of the work.
+            return leaky_relu(max_pool2d(self.conv2(hidden), 2), SLOPE, inplace=True).flatten(1).float()
 
 
 class LidarTrunk(nn.Module):
@@ -155,17 +162,11 @@ class FusionNet(Network):
 
     @classmethod
     def from_experts(cls, camera: CameraNet, lidar: LidarNet, *, seed: int = 0) -> "FusionNet":
-        """Build a novice whose trunks are frozen copies of the experts' trunks."""
+        """Build a novice whose trunks are copies of the experts' trunks. The learner can keep them frozen."""
         network = cls(lidar.trunk.bins, camera.trunk.filters, px=camera.trunk.px, seed=seed)
         network.camera.load_state_dict(camera.trunk.state_dict())
         network.lidar.load_state_dict(lidar.trunk.state_dict())
-        network.freeze_trunks()
         return network
-
-    def freeze_trunks(self) -> None:
-        """Keep the trunks as they are: only the three fusion layers train from now on."""
-        self.camera.requires_grad_(False)
-        self.lidar.requires_grad_(False)
 
     def trunk(self, scan: Tensor, image: Tensor) -> Tensor:
         """Both trunks, concatenated: camera first."""

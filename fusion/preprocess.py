@@ -168,8 +168,18 @@ def gray_image(image: Image | CompressedImage, px: int) -> FloatArray:
     gray = _decode(image, px) if isinstance(image, CompressedImage) else _raw_gray(image)
     if gray.shape != (px, px):
         gray = cv2.resize(gray, (px, px), interpolation=cv2.INTER_AREA).astype(np.uint8, copy=False)
-    unit: FloatArray = _UNIT[gray]
-    return unit
+    return from_uint8(gray)
+
+
+def to_uint8(image: FloatArray) -> ByteArray:
+    """Turn an image in [0, 1] back into the gray levels it came from, exactly."""
+    return np.rint(image * 255).astype(np.uint8)
+
+
+def from_uint8(gray: ByteArray) -> FloatArray:
+    """Scale gray levels to [0, 1]."""
+    image: FloatArray = _UNIT[gray]
+    return image
 
 
 def _raw_gray(image: Image) -> ByteArray:
