@@ -1,0 +1,59 @@
+"""Benchmarks. Each module has `run() -> rows`: medians of several runs, ratios against a reference in the same run."""
+
+import os
+import platform
+import sys
+from collections.abc import Sequence
+from datetime import UTC, datetime
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+
+Row = dict[str, object]
+
+BENCHES = {
+    "twin": "the twin in process: times real time, and beside the bare pybullet calls of the same scene",
+    "lockstep": "twin and learner in two processes over the bus in lockstep: times real time",
+    "latency": "from a capture to the applied command through the whole stack, beside a bare zenoh echo",
+    "train": "one training step, beside a plain PyTorch loop, and what it does to the control loop",
+    "preprocess": "a JPEG of 640x480 to 32x32 gray, beside full decoding and resizing",
+}
+PACKAGES = ("numpy", "opencv-python-headless", "rosbags", "eclipse-zenoh", "pybullet", "torch")
+
+
+def describe_machine() -> Row:
+    """Say what the numbers were measured on."""
+    packages = {}
+    for package in PACKAGES:
+        try:
+            packages[package] = version(package)
+        except PackageNotFoundError:
+            continue
+    return {
+        "cpu": cpu_model(),
+        "cores": len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count(),
+        "system": platform.platform(),
+        "python": platform.python_version(),
+        "packages": packages,
+        "date": datetime.now(UTC).isoformat(timespec="seconds"),
+    }
+
+
+def cpu_model(cpuinfo: Path = Path("/proc/cpuinfo")) -> str:
+    """Name of the processor, as far as the system tells."""
+    if sys.platform == "linux" and cpuinfo.exists():
+        for line in cpuinfo.read_text(encoding="utf-8", errors="replace").splitlines():
+            if line.startswith("model name"):
+                return line.partition(":")[2].strip()
+    return platform.processor() or platform.machine()
+
+
+def columns(rows: Sequence[Row]) -> list[str]:
+    """Every field of any row, in order of first appearance."""
+    return list(dict.fromkeys(name for row in rows for name in row))
+
+
+def cell(value: object) -> str:
+    """A field as text: three significant digits for a float."""
+    if isinstance(value, float):
+        return f"{value:.0f}" if abs(value) >= 100 else f"{value:.3g}"
+    return "" if value is None else str(value)

@@ -1,0 +1,67 @@
+"""Measure speed on this machine.
+
+examples:
+  lira bench twin                       a table to read
+  lira bench twin --json -              one JSON object {name, machine, results} and nothing else on standard output
+  lira bench latency --json latency.json
+"""
+
+import argparse
+import importlib
+import json
+import os
+import sys
+from pathlib import Path
+from typing import TextIO
+
+from hal.errors import StorageError
+from tools.bench import BENCHES, Row, cell, columns, describe_machine
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the arguments."""
+    names = "; ".join(f"{name}: {words}" for name, words in BENCHES.items())
+    parser.add_argument("name", choices=BENCHES, metavar="NAME", help=names)
+    parser.add_argument("--json", metavar="FILE", help="write a JSON object to FILE (-: standard output)")
+
+
+def run(args: argparse.Namespace) -> int:
+    """Run one benchmark and show its rows."""
+    output = take_stdout() if args.json == "-" else sys.stdout
+    module = importlib.import_module(f"tools.bench.{args.name}")
+    results: list[Row] = module.run()
+    if args.json is not None:
+        text = json.dumps({"name": args.name, "machine": describe_machine(), "results": results}, indent=2)
+        if args.json == "-":
+            print(text, file=output, flush=True)
+            return 0
+        write_file(Path(args.json), text)
+    print(table(results), file=output)
+    return 0
+
+
+def take_stdout() -> TextIO:
+    """Return standard output for the JSON alone; from now on whatever else is printed goes to standard error.
+
+    The libraries below print from C, and may do so as late as at exit: the descriptor itself is moved.
+    """
+    sys.stdout.flush()
+    kept = os.fdopen(os.dup(sys.stdout.fileno()), "w", encoding="utf-8")
+    os.dup2(sys.stderr.fileno(), sys.stdout.fileno())
+    return kept
+
+
+def write_file(path: Path, text: str) -> None:
+    """Write the object. Raises `StorageError`."""
+    try:
+        path.write_text(text + "\n", encoding="utf-8")
+    except OSError as error:
+        raise StorageError(f"cannot write {path}: {error.strerror}", "Choose another file.") from error
+
+
+def table(results: list[Row]) -> str:
+    """Rows for a person."""
+    from tools.table import format_table
+
+    names = columns(results)
+    return format_table(names, [[cell(row.get(name)) for name in names] for row in results])
