@@ -13,6 +13,7 @@ from sim_backend.course import Course
 # The referee looks at least this often, and every centimetre or so where a box may be touched.
 REFEREE_PERIOD_S = 0.2
 TOUCH_PERIOD_S = 0.01
+ROUNDING_S = 1e-9
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,7 +44,7 @@ class Body:
         self.odometry = drive.motion(0.0, 0.0, 0.0)
         self.command(STOP)
         self.verdict = Verdict(start_m, start_m, lateral_m, math.inf)
-        self._judge(touched=False)
+        self._judge(float(self.course.clearance(self.motion.xy)), touched=False)
 
     def place(self, state: CourseState) -> None:
         """Continue from a state that a twin told: pose, velocity, progress; nothing has gone wrong yet."""
@@ -52,7 +53,7 @@ class Body:
         self.command(Twist(state.linear_m_s, state.angular_rad_s))
         progress_m = self._progress_m(None if math.isnan(state.progress_m) else state.progress_m)
         self.verdict = Verdict(progress_m, progress_m, 0.0, math.inf)
-        self._judge(touched=False)
+        self._judge(float(self.course.clearance(self.motion.xy)), touched=False)
 
     def command(self, target: Twist) -> None:
         """Set the velocity to drive at from now on."""
@@ -61,13 +62,8 @@ class Body:
 
     def advance(self, until_s: float) -> None:
         """Work the motion out until `until_s`."""
-        while (left_s := until_s - self.time_s) > 1e-9:
-            speed = max(abs(float(self.motion.linear_m_s)), abs(self._target.linear_m_s))
-            duration_s = min(left_s, REFEREE_PERIOD_S)
-            if speed * duration_s >= self.verdict.clearance_m:
-                duration_s = min(left_s, TOUCH_PERIOD_S)
-            self._step(duration_s)
-            self.time_s += duration_s
+        while (left_s := until_s - self.time_s) > ROUNDING_S:
+            self._move(min(left_s, REFEREE_PERIOD_S))
         self.time_s = max(self.time_s, until_s)
 
     def state(self) -> CourseState:
@@ -100,29 +96,42 @@ class Body:
             angular_rad_s=float(odometry.angular_rad_s),
         )
 
-    def _step(self, duration_s: float) -> None:
+    def _move(self, duration_s: float) -> None:
+        """Move in steps that cannot jump into a box, then let the referee look."""
+        until_s = self.time_s + duration_s
+        touched = False
+        clearance_m = self.verdict.clearance_m
+        while (left_s := until_s - self.time_s) > ROUNDING_S:
+            speed_m_s = max(abs(float(self.motion.linear_m_s)), abs(self._target.linear_m_s))
+            step_s = left_s
+            if speed_m_s * left_s >= clearance_m:
+                step_s = min(left_s, max(clearance_m / speed_m_s, TOUCH_PERIOD_S))
+            before, after = self.motion, self._step(step_s)
+            ahead_m = float(self.course.clearance(after.xy))
+            if ahead_m < 0.0 and ahead_m < clearance_m:
+                # A disc that touches can turn, and back away, but not go on.
+                touched = True
+                after = replace(after, x_m=before.x_m, y_m=before.y_m, linear_m_s=np.zeros(()))
+            else:
+                clearance_m = ahead_m
+            self.motion = after
+            rate_rad_s = drive.odometry_rate_rad_s(self._base, after)
+            self.odometry = drive.glide(self.odometry, after.linear_m_s, rate_rad_s, step_s)
+            self.time_s += step_s
+        self._judge(clearance_m, touched)
+
+    def _step(self, duration_s: float) -> drive.Motion:
         target = self._target
-        silent_s = self.time_s - self._commanded_s
-        if self._base.drive == "wheels" and silent_s >= drive.FIRMWARE_WATCHDOG_S:
+        if self._base.drive == "wheels" and self.time_s - self._commanded_s >= drive.FIRMWARE_WATCHDOG_S:
             target = STOP
-        before = self.motion
-        after = drive.step(
-            self._base, before, np.float64(target.linear_m_s), np.float64(target.angular_rad_s), duration_s
+        return drive.step(
+            self._base, self.motion, np.asarray(target.linear_m_s), np.asarray(target.angular_rad_s), duration_s
         )
-        clearance_m = float(self.course.clearance(after.xy))
-        touched = clearance_m < 0.0 and clearance_m < self.verdict.clearance_m
-        if touched:
-            # A disc that touches can turn, and back away, but not go on.
-            after = replace(after, x_m=before.x_m, y_m=before.y_m, linear_m_s=np.float64(0.0))
-        self.motion = after
-        rate = drive.odometry_rate_rad_s(self._base, after)
-        self.odometry = drive.glide(self.odometry, after.linear_m_s, rate, duration_s)
-        self._judge(touched)
 
     def _progress_m(self, hint_m: float | None) -> float:
         return float(self.course.place(self.motion.xy, self.motion.yaw_rad, hint_m).progress_m)
 
-    def _judge(self, touched: bool) -> None:
+    def _judge(self, clearance_m: float, touched: bool) -> None:
         course, was = self.course, self.verdict
         place = course.place(self.motion.xy, self.motion.yaw_rad, was.progress_m)
         progress_m, lateral_m = float(place.progress_m), float(place.lateral_m)
@@ -130,8 +139,8 @@ class Body:
             start_m=was.start_m,
             progress_m=progress_m,
             lateral_m=lateral_m,
-            clearance_m=float(course.clearance(self.motion.xy)),
+            clearance_m=clearance_m,
             collided=was.collided or touched,
-            lost=was.lost or bool(course.lost(place.lateral_m)),
+            lost=was.lost or course.lost(lateral_m),
             finished=was.finished or course.finished(progress_m, was.start_m),
         )

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from hal.profile import Base
-from sim_backend.layout import Layout
+from sim_backend.layout import Block, Layout
 from sim_backend.polyline import Floats
 
 
@@ -19,6 +19,43 @@ class Place:
     heading_error_rad: Floats
 
 
+@dataclass(frozen=True, slots=True)
+class Obstacles:
+    """The boxes as arrays [boxes]: centre, half edges, direction of the length."""
+
+    x_m: Floats
+    y_m: Floats
+    half_length_m: Floats
+    half_width_m: Floats
+    cos: Floats
+    sin: Floats
+
+    @staticmethod
+    def of(blocks: tuple[Block, ...]) -> "Obstacles":
+        """Take what matters of the boxes."""
+        rows = [(b.x_m, b.y_m, b.length_m / 2, b.width_m / 2, math.cos(b.yaw_rad), math.sin(b.yaw_rad)) for b in blocks]
+        return Obstacles(*np.array(rows, dtype=np.float64).reshape(-1, 6).T)
+
+    def near(self, x_m: float, y_m: float, reach_m: float) -> "Obstacles":
+        """Only the boxes with their centre within `reach_m` of a point."""
+        kept = np.hypot(self.x_m - x_m, self.y_m - y_m) <= reach_m
+        return Obstacles(
+            *(self.x_m[kept], self.y_m[kept], self.half_length_m[kept], self.half_width_m[kept]),
+            *(self.cos[kept], self.sin[kept]),
+        )
+
+    def distance(self, xy: Floats) -> Floats:
+        """Metres from each of `xy` [..., 2] to the nearest outline, below 0 inside, +inf without boxes."""
+        if not len(self.x_m):
+            return np.full(xy.shape[:-1], np.inf)
+        off_x, off_y = xy[..., 0, None] - self.x_m, xy[..., 1, None] - self.y_m
+        along = np.abs(self.cos * off_x + self.sin * off_y) - self.half_length_m
+        across = np.abs(self.cos * off_y - self.sin * off_x) - self.half_width_m
+        outside = np.hypot(np.maximum(along, 0.0), np.maximum(across, 0.0))
+        nearest: Floats = (outside + np.minimum(np.maximum(along, across), 0.0)).min(-1)
+        return nearest
+
+
 class Course:
     """A layout as a robot of radius `radius_m` (the half diagonal of its footprint) meets it."""
 
@@ -27,23 +64,11 @@ class Course:
         self.radius_m = radius_m
         self.limits = layout.world.limits
         self.has_line = layout.world.line is not None
-        blocks = layout.blocks
-        self._centre = np.array([(b.x_m, b.y_m) for b in blocks], dtype=np.float64).reshape(-1, 2)
-        self._half = np.array([(b.length_m, b.width_m) for b in blocks], dtype=np.float64).reshape(-1, 2) / 2
-        yaw = np.array([b.yaw_rad for b in blocks], dtype=np.float64)
-        # World to box: a row vector of offsets times this, one matrix per box.
-        self._turn = np.stack([np.cos(yaw), -np.sin(yaw), np.sin(yaw), np.cos(yaw)], axis=-1).reshape(-1, 2, 2)
+        self.obstacles = Obstacles.of(layout.blocks)
 
     def clearance(self, xy: Floats) -> Floats:
         """Metres between the robot's disc at each of `xy` [..., 2] and the nearest box; below 0 it is inside."""
-        if not len(self._centre):
-            return np.full(xy.shape[:-1], np.inf)
-        offset = xy[..., None, None, :] - self._centre[:, None, :]
-        outside = np.abs((offset @ self._turn)[..., 0, :]) - self._half
-        positive = np.maximum(outside, 0.0)
-        distance = np.hypot(positive[..., 0], positive[..., 1]) + np.minimum(outside.max(-1), 0.0)
-        nearest: Floats = distance.min(-1) - self.radius_m
-        return nearest
+        return self.obstacles.distance(xy) - self.radius_m
 
     def place(self, xy: Floats, yaw_rad: Floats, hint_m: Floats | float | None = None) -> Place:
         """Project poses, xy [..., 2] and yaw [...], near the progress `hint_m` (see `Polyline.project`)."""
@@ -51,10 +76,9 @@ class Course:
         error = np.remainder(yaw_rad - heading + math.pi, math.tau) - math.pi
         return Place(progress, lateral, error)
 
-    def lost(self, lateral_m: Floats) -> Floats:
-        """Tell where the line is too far away, [...] of bool."""
-        too_far: Floats = np.abs(lateral_m) > self.limits.lost_m
-        return too_far
+    def lost(self, lateral_m: float) -> bool:
+        """Tell whether the line is too far away."""
+        return abs(lateral_m) > self.limits.lost_m
 
     def finished(self, progress_m: float, start_m: float) -> bool:
         """Tell whether a drive that began at `start_m` is over."""

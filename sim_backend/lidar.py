@@ -17,7 +17,7 @@ def beam_angles(lidar: Lidar) -> tuple[Floats, float]:
     """
     full_turn = lidar.fov_rad > math.tau - 1e-3
     increment = lidar.fov_rad / (lidar.beams if full_turn else max(lidar.beams - 1, 1))
-    return -lidar.fov_rad / 2 + increment * np.arange(lidar.beams), increment
+    return np.arange(lidar.beams, dtype=np.float64) * increment - lidar.fov_rad / 2, increment
 
 
 class RayLidar:

@@ -7,10 +7,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 Floats = NDArray[np.float64]
+Indices = NDArray[np.int64]
 
 STEP_M = 0.1
 # A hint is the progress a moment ago. This is how far it may be off.
-WINDOW_M = 1.5
+WINDOW_M = 1.2
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,39 +53,47 @@ class Polyline:
     def project(self, xy: Floats, hint_m: Floats | float | None = None) -> tuple[Floats, Floats, Floats]:
         """Nearest place on the curve to each of `xy` [..., 2]: progress [...], lateral [...], heading [...].
 
-        With `hint_m` [...] or one for all only the curve around that progress is looked at: where a figure-eight crosses
-        itself the branch being driven is kept, and progress goes on growing over the laps of a closed curve.
+        With `hint_m` [...], or one for all, only the curve around that progress is looked at: where a figure-eight
+        crosses itself the branch being driven is kept, and progress goes on growing over the laps of a closed curve.
         """
+        x, y = xy[..., 0], xy[..., 1]
+        vertex = self._nearest_vertex(x, y, hint_m)
+        first = vertex % self.segments if self.closed else vertex
+        heading = self.headings[first]
+        # The nearest place is on the stretch before or after the nearest vertex.
+        behind = (x - self.points[first, 0]) * np.cos(heading) + (y - self.points[first, 1]) * np.sin(heading) < 0.0
+        begin = vertex - behind
+        if not self.closed:
+            begin = np.clip(begin, 0, self.segments - 1)
+        first = begin % self.segments
+        chord_x, chord_y = (self.points[first + 1] - self.points[first]).T
+        off_x, off_y = x - self.points[first, 0], y - self.points[first, 1]
+        t = (off_x * chord_x + off_y * chord_y) / (chord_x * chord_x + chord_y * chord_y)
+        inside = np.clip(t, 0.0, 1.0)
+        if not self.closed:
+            beyond = ((begin == 0) & (t < 0.0)) | ((begin == self.segments - 1) & (t > 1.0))
+            inside = np.where(beyond, t, inside)
+        distance = np.hypot(off_x - inside * chord_x, off_y - inside * chord_y)
+        heading = self.headings[first] + np.clip(inside, 0.0, 1.0) * (self.headings[first + 1] - self.headings[first])
+        lateral = np.copysign(distance, chord_x * off_y - chord_y * off_x)
+        return (begin + inside) * self.step_m, lateral, heading
+
+    def _nearest_vertex(self, x: Floats, y: Floats, hint_m: Floats | float | None) -> Indices:
+        """Index of the nearest vertex [...]; on a closed curve it counts on over the laps."""
         if hint_m is None:
-            index = np.broadcast_to(np.arange(self.segments), (*xy.shape[:-1], self.segments))
+            near = np.arange(self.segments + (not self.closed))
         else:
             reach = math.ceil(WINDOW_M / self.step_m)
-            middle = np.floor(np.asarray(hint_m) / self.step_m).astype(np.int64)
+            middle = np.rint(np.asarray(hint_m) / self.step_m).astype(np.int64)
+            near = middle[..., None] + np.arange(-reach, reach + 1)
             if not self.closed:
-                middle = np.clip(middle, 0, self.segments - 1)
-            index = np.broadcast_to(middle, xy.shape[:-1])[..., None] + np.arange(-reach, reach + 1)
-            if not self.closed:
-                index = np.clip(index, 0, self.segments - 1)
-        wrapped = index % self.segments
-        begin = self.points[wrapped]
-        chord = self.points[wrapped + 1] - begin
-        offset = xy[..., None, :] - begin
-        t = (offset * chord).sum(-1) / (chord * chord).sum(-1)
-        low = 0.0 if self.closed else np.where(wrapped == 0, -np.inf, 0.0)
-        high = 1.0 if self.closed else np.where(wrapped == self.segments - 1, np.inf, 1.0)
-        t = np.clip(t, low, high)
-        miss = offset - t[..., None] * chord
-        distance = np.hypot(miss[..., 0], miss[..., 1])
-        best = distance.argmin(-1)[..., None]
-
-        def pick(values: Floats) -> Floats:
-            return np.take_along_axis(values, best, -1)[..., 0]
-
-        side = pick(chord[..., 0] * offset[..., 1] - chord[..., 1] * offset[..., 0])
-        inside = np.clip(pick(t), 0.0, 1.0)
-        first = pick(wrapped)
-        heading = self.headings[first] + inside * (self.headings[first + 1] - self.headings[first])
-        return (pick(index) + pick(t)) * self.step_m, np.copysign(pick(distance), side), heading
+                near = np.clip(near, 0, self.segments)
+        wrapped = near % self.segments if self.closed else near
+        gap_x, gap_y = self.points[wrapped, 0] - x[..., None], self.points[wrapped, 1] - y[..., None]
+        best = (gap_x * gap_x + gap_y * gap_y).argmin(-1)
+        near = np.broadcast_to(near, gap_x.shape)
+        vertex: Indices = np.take_along_axis(near, best[..., None], -1)[..., 0]
+        return vertex
 
 
 def resample(points: Floats, closed: bool) -> Polyline:

@@ -9,8 +9,10 @@ import ctypes
 import importlib.util
 import os
 import sys
+import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager
+from pathlib import Path
 from types import ModuleType
 
 import numpy as np
@@ -27,6 +29,8 @@ PAINT_STEP_M = 0.3
 UNDERGROUND = (0.0, 0.0, -1000.0)
 UPRIGHT = (0.0, 0.0, 0.0, 1.0)
 
+# Corners [n, 3] and the triangles between them, three indices each.
+Mesh = tuple[Floats, list[int]]
 Shape = tuple[float, float, float, int]
 
 
@@ -71,9 +75,9 @@ class Scene:
         self.egl = egl and self._load_egl()
         self._boxes: dict[Shape, list[int]] = {}
         world = layout.world
-        self._paint(*floor_mesh(), world.ground_gray)
+        self._draw(floor_mesh(), world.ground_gray)
         if world.line is not None:
-            self._paint(*ribbon_mesh(layout.curve, world.line), world.line.gray)
+            self._draw(ribbon_mesh(layout.curve, world.line), world.line.gray)
         self.arrange(layout)
 
     def arrange(self, layout: Layout) -> None:
@@ -103,30 +107,28 @@ class Scene:
             number: int = self.bullet.loadPlugin(plugin.origin, "_eglRendererPlugin", physicsClientId=self.client)
         return number >= 0
 
-    def _paint(self, vertices: Floats, indices: list[int], gray: int) -> None:
-        """Add a picture without substance."""
-        self._body(-1, self._mesh(vertices, indices, gray))
-
     def _box(self, shape: Shape) -> int:
         half = [edge / 2 for edge in shape[:3]]
         solid = self.bullet.createCollisionShape(self.bullet.GEOM_BOX, halfExtents=half, physicsClientId=self.client)
-        body = self._body(solid, self._mesh(*box_mesh(half), shape[3]))
+        body = self._draw(box_mesh(half), shape[3], solid)
         self._boxes.setdefault(shape, []).append(body)
         return body
 
-    def _mesh(self, vertices: Floats, indices: list[int], gray: int) -> int:
-        visual: int = self.bullet.createVisualShape(
-            self.bullet.GEOM_MESH,
-            vertices=vertices.tolist(),
-            indices=indices,
-            normals=[[0.0, 0.0, 1.0]] * len(vertices),
-            rgbaColor=[gray / 255, gray / 255, gray / 255, 1.0],
-            physicsClientId=self.client,
-        )
-        return visual
-
-    def _body(self, solid: int, visual: int) -> int:
-        body: int = self.bullet.createMultiBody(0, solid, visual, physicsClientId=self.client)
+    def _draw(self, mesh: Mesh, gray: int, solid: int = -1) -> int:
+        """Add a body; without a solid it is a picture only."""
+        # A little above the gray asked for: the renderers cut off where they should round.
+        shade = min((gray + 0.25) / 255, 1.0)
+        with tempfile.TemporaryDirectory() as folder:
+            # A file, because the OpenGL plugin crashes on a mesh handed over in memory.
+            path = Path(folder) / "mesh.obj"
+            path.write_text(obj_text(mesh), encoding="ascii")
+            visual = self.bullet.createVisualShape(
+                self.bullet.GEOM_MESH,
+                fileName=str(path),
+                rgbaColor=[shade, shade, shade, 1.0],
+                physicsClientId=self.client,
+            )
+            body: int = self.bullet.createMultiBody(0, solid, visual, physicsClientId=self.client)
         return body
 
     def _move(self, body: int, position: tuple[float, float, float], turn: tuple[float, float, float, float]) -> None:
@@ -138,7 +140,7 @@ def yaw_quaternion(block: Block) -> tuple[float, float, float, float]:
     return 0.0, 0.0, float(np.sin(block.yaw_rad / 2)), float(np.cos(block.yaw_rad / 2))
 
 
-def floor_mesh() -> tuple[Floats, list[int]]:
+def floor_mesh() -> Mesh:
     """One square, facing up."""
     far = FLOOR_M
     return np.array([[-far, -far, 0], [far, -far, 0], [far, far, 0], [-far, far, 0]], dtype=np.float64), [
@@ -151,7 +153,7 @@ def floor_mesh() -> tuple[Floats, list[int]]:
     ]
 
 
-def ribbon_mesh(curve: Polyline, line: Line) -> tuple[Floats, list[int]]:
+def ribbon_mesh(curve: Polyline, line: Line) -> Mesh:
     """Two triangles for each stretch of the line, facing up."""
     count = max(round(curve.length_m / PAINT_STEP_M), 1)
     edges = []
@@ -163,8 +165,18 @@ def ribbon_mesh(curve: Polyline, line: Line) -> tuple[Floats, list[int]]:
     return np.array(edges), indices
 
 
-def box_mesh(half: list[float]) -> tuple[Floats, list[int]]:
+def box_mesh(half: list[float]) -> Mesh:
     """The six faces of a box, two triangles each, facing out."""
     corners = np.array([(x, y, z) for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)]) * np.array(half)
     faces = [(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3)]
     return corners, [index for a, b, c, d in faces for index in (a, b, c, a, c, d)]
+
+
+def obj_text(mesh: Mesh) -> str:
+    """Write a mesh as a Wavefront file, with every normal up."""
+    corners, indices = mesh
+    lines = [f"v {x:.6f} {y:.6f} {z:.6f}" for x, y, z in corners]
+    lines.append("vn 0 0 1")
+    for triangle in np.array(indices).reshape(-1, 3) + 1:
+        lines.append("f " + " ".join(f"{corner}//1" for corner in triangle))
+    return "\n".join(lines) + "\n"

@@ -132,17 +132,15 @@ class Twin:
         """Put the robot down anew; a new layout only moves the boxes. Time goes on."""
         with self._sensor_lock, self._lock:
             self._body.advance(self.now())
-            if episode.layout != self.layout.seed:
-                self._body.course = Course(build(self.world, episode.layout), self._body.course.radius_m)
-                if self._sensors is not None:
-                    self._sensors.arrange(self.layout)
+            self._arrange(episode.layout)
             self._body.put_down(episode.start_m, episode.lateral_m, episode.yaw_rad)
             self._forget()
 
-    def place(self, state: CourseState) -> None:
-        """Put the robot into exactly this state, on the present layout. For looking ahead, see `foresight`."""
+    def place(self, layout: int, state: CourseState) -> None:
+        """Put the robot into exactly this state. For looking ahead, see `foresight`."""
         with self._sensor_lock, self._lock:
             self._body.advance(self.now())
+            self._arrange(layout)
             self._body.place(state)
             self._forget()
 
@@ -151,6 +149,13 @@ class Twin:
         with self._lock:
             self._body.advance(self.now())
             return self._body.state()
+
+    def _arrange(self, layout: int) -> None:
+        if layout == self.layout.seed:
+            return
+        self._body.course = Course(build(self.world, layout), self._body.course.radius_m)
+        if self._sensors is not None:
+            self._sensors.arrange(self.layout)
 
     def _forget(self) -> None:
         self._newest = None

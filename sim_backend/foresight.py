@@ -1,0 +1,115 @@
+"""Looking ahead: what would happen from here. For scripted teachers and planners, never for policies."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from hal.messages import Action, Command, CourseState, Observation, Twist
+from hal.profile import RobotProfile
+from sim_backend import drive
+from sim_backend.camera import Renderer
+from sim_backend.course import Course, Place, footprint_radius_m
+from sim_backend.drive import Motion
+from sim_backend.layout import build
+from sim_backend.polyline import Floats
+from sim_backend.twin import Twin
+from sim_backend.world import World, load_world
+
+# A box's corner can hide between two looks at the clearance that are farther apart than this.
+LOOK_PERIOD_S = 0.1
+# Boxes whose centre is farther than this from all that can be reached are left out.
+CARE_M = 2.0
+
+
+@dataclass(frozen=True, slots=True)
+class Imagined:
+    """Where N imagined robots are after each of T actions, arrays [N, T].
+
+    `clearance_m` is the least since the action before, +inf where every box is too far away to matter.
+    Without a line what is relative to it is nan.
+    """
+
+    x_m: Floats
+    y_m: Floats
+    yaw_rad: Floats
+    clearance_m: Floats
+    lateral_m: Floats
+    progress_m: Floats
+    heading_error_rad: Floats
+
+
+class Foresight:
+    """A second twin on the same floor, put where the first one is and let run ahead.
+
+    `rollout` renders what the imagined robot would see; `imagine` only moves it. Both use the twin's own drive model.
+    """
+
+    def __init__(
+        self, profile: RobotProfile, world: str | World, layout: int = 0, *, renderer: Renderer = "auto"
+    ) -> None:
+        self._profile = profile
+        self._world = load_world(world) if isinstance(world, str) else world
+        self._twin = Twin(profile, self._world, layout=layout, renderer=renderer)
+        self.set_layout(layout)
+
+    def set_layout(self, layout: int) -> None:
+        """Follow the first twin to another layout."""
+        self.course = Course(build(self._world, layout), footprint_radius_m(self._profile.base))
+
+    def rollout(
+        self, state: CourseState, policy: Callable[[Observation], Action], steps: int, period_s: float
+    ) -> list[CourseState]:
+        """Let `policy` drive from `state`: the state after each of `steps`, the last being a collision or a loss."""
+        twin, base = self._twin, self._profile.base
+        twin.open()
+        twin.place(self.course.layout.seed, state)
+        states: list[CourseState] = []
+        for _ in range(steps):
+            linear, angular = policy(twin.read())
+            twist = Twist(linear * base.max_linear_m_s, angular * base.max_angular_rad_s)
+            twin.drive(Command(twist, twin.now()))
+            twin.wait(twin.now() + period_s)
+            states.append(twin.state())
+            if states[-1].collided or states[-1].lost:
+                break
+        return states
+
+    def imagine(self, state: CourseState, actions: Floats, period_s: float) -> Imagined:
+        """Drive N imagined robots from `state` by `actions` [N, T, 2], each held for `period_s`. Boxes do not block."""
+        base = self._profile.base
+        count, horizon, _ = actions.shape
+        targets = np.clip(actions, -1.0, 1.0) * np.array([base.max_linear_m_s, base.max_angular_rad_s])
+        looks = max(round(period_s / LOOK_PERIOD_S), 1)
+        motion = spread(state, count)
+        place = Place(*np.full((3, count), np.nan))
+        if self.course.has_line:
+            place = self.course.place(motion.xy, motion.yaw_rad, state.progress_m)
+        seen, columns = [], []
+        for t in range(horizon):
+            for _ in range(looks):
+                motion = drive.step(base, motion, targets[:, t, 0], targets[:, t, 1], period_s / looks)
+                seen.append(motion.xy)
+            if self.course.has_line:
+                place = self.course.place(motion.xy, motion.yaw_rad, place.progress_m)
+            columns.append(
+                (
+                    *(motion.x_m, motion.y_m, motion.yaw_rad),
+                    *(place.lateral_m, place.progress_m, place.heading_error_rad),
+                )
+            )
+        x, y, yaw, lateral, progress, error = (np.stack(column, axis=-1) for column in zip(*columns, strict=True))
+        reach_m = base.max_linear_m_s * period_s * horizon + CARE_M
+        distance = self.course.obstacles.near(state.x_m, state.y_m, reach_m).distance(np.stack(seen, axis=1))
+        clearance = distance.reshape(count, horizon, looks).min(-1) - self.course.radius_m
+        return Imagined(x, y, yaw, clearance, lateral, progress, error)
+
+    def close(self) -> None:
+        """Let go of the second twin. May be called twice."""
+        self._twin.close()
+
+
+def spread(state: CourseState, count: int) -> Motion:
+    """Make `count` robots in one state."""
+    values = (state.x_m, state.y_m, state.yaw_rad, state.linear_m_s, state.angular_rad_s)
+    return Motion(*(np.full(count, value) for value in values))
