@@ -1,10 +1,10 @@
 """The demonstration log: every label with what was seen, in one append-only file.
 
 A stored label survives `kill -9`: each record is one write to the kernel. The file is synced to the disk when it is
-closed, not at every label, which could stall the control loop; a power cut can cost what the kernel has not written yet.
+closed, not at every label, which could stall the control loop: a power cut can cost what the kernel still holds.
 
-Layout, little-endian: a header (magic, version, bins, px, profile, CRC-32), then records of one size, each with a CRC-32
-of its own. One size keeps a damaged record from hiding the ones behind it.
+Layout, little-endian: a header (magic, version, bins, px, profile, CRC-32), then records of one size, each with a
+CRC-32 of its own. One size keeps a damaged record from hiding the ones behind it.
 """
 
 import errno
@@ -146,7 +146,7 @@ class DemonstrationLog:
             self._drain()
             os.fsync(self._file)
         except OSError as error:
-            raise self._failed(error) from error
+            raise self._failed(os.strerror(error.errno or 0)) from error
         finally:
             os.close(self._file)
             self._file = -1
@@ -164,17 +164,18 @@ class DemonstrationLog:
 
     def _write(self, data: bytes) -> None:
         """Write all of it or nothing."""
+        written, reason = 0, os.strerror(errno.ENOSPC)
         try:
             written = os.write(self._file, data)
-            if written < len(data):
-                raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
         except OSError as error:
+            reason = os.strerror(error.errno or 0)
+        if written < len(data):
             os.ftruncate(self._file, self._end)
-            raise self._failed(error) from error
+            raise self._failed(reason)
         self._end += written
 
-    def _failed(self, error: OSError) -> StorageError:
-        what = f"cannot write to {self._path}: {error.strerror}"
+    def _failed(self, reason: str) -> StorageError:
+        what = f"cannot write to {self._path}: {reason}"
         return StorageError(f"{what}; {len(self._unwritten)} labels wait in memory", "Free some space on that disk.")
 
     def _check_space(self) -> None:

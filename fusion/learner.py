@@ -7,7 +7,8 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from fusion.networks import CameraTrunk, LidarTrunk, Network, Weights as Weights
+from fusion.networks import CameraTrunk, LidarTrunk, Network
+from fusion.networks import Weights as Weights
 from fusion.preprocess import to_uint8
 from hal.messages import Action, FloatArray
 
