@@ -2,30 +2,35 @@
 PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
+BENCHES := twin lockstep latency train preprocess
 
 .PHONY: setup demo test check bench clean
 
 setup: $(VENV)/.installed
 
+# The stamp is written last: whatever was interrupted before it is done again.
 $(VENV)/.installed: pyproject.toml constraints.txt
-	test -x $(BIN)/python || $(PYTHON) -m venv $(VENV)
-	$(BIN)/pip install --quiet --constraint constraints.txt --editable '.[dev]'
-	touch $@
+	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' \
+	  || { echo "Python 3.11 or newer is needed: make setup PYTHON=python3.11"; exit 1; }
+	@$(BIN)/python -m pip --version >/dev/null 2>&1 || $(PYTHON) -m venv --clear $(VENV)
+	$(BIN)/python -m pip install --quiet --constraint constraints.txt --editable '.[dev]'
+	@touch $@
 
 demo: setup
 	$(BIN)/lira demo
 
 test: setup
-	$(BIN)/pytest
+	$(BIN)/python -m pytest
 
 check: setup
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
-	$(BIN)/pytest tests/test_layering.py
+	$(BIN)/python -m pytest tests/test_layering.py
 
 bench: setup
-	for name in twin lockstep latency train preprocess; do $(BIN)/lira bench $$name --json - || exit 1; done
+	@mkdir -p runs/bench
+	@for name in $(BENCHES); do $(BIN)/lira bench $$name --json runs/bench/$$name.json || exit 1; done
 
 clean:
 	rm -rf $(VENV) runs

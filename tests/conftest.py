@@ -1,0 +1,35 @@
+"""In CI (`CI=true`) a skipped test fails unless its reason is expected: a suite that skips itself proves nothing."""
+
+import os
+from collections.abc import Generator
+
+import pytest
+
+EXPECTED_SKIPS: frozenset[str] = frozenset()
+
+
+def fail_if_unexpected(report: pytest.TestReport | pytest.CollectReport) -> None:
+    """Turn a skip into a failure, unless it is expected."""
+    if not report.skipped or hasattr(report, "wasxfail") or not isinstance(report.longrepr, tuple):
+        return
+    reason = report.longrepr[2].removeprefix("Skipped: ")
+    if reason not in EXPECTED_SKIPS:
+        report.outcome = "failed"
+        report.longrepr = f"skipped in CI, which has everything it needs: {reason}"
+
+
+if os.environ.get("CI") == "true":
+
+    @pytest.hookimpl(wrapper=True)
+    def pytest_runtest_makereport() -> Generator[None, pytest.TestReport, pytest.TestReport]:
+        """Judge the skips of tests."""
+        report = yield
+        fail_if_unexpected(report)
+        return report
+
+    @pytest.hookimpl(wrapper=True)
+    def pytest_make_collect_report() -> Generator[None, pytest.CollectReport, pytest.CollectReport]:
+        """Judge the skips of whole modules."""
+        report = yield
+        fail_if_unexpected(report)
+        return report
