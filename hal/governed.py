@@ -1,0 +1,88 @@
+"""A robot behind its governor: whatever is asked of it, only what the governor allows reaches the wheels."""
+
+import threading
+from dataclasses import replace
+
+from hal.governor import Governor
+from hal.messages import Applied, Command, Observation
+from hal.port import Robot
+from hal.profile import RobotProfile
+
+SLICE_S = 0.05  # the watchdog looks at least this often while the robot's time passes in `wait`
+ROUNDING_S = 1e-9
+
+
+class GovernedRobot:
+    """Implements `hal.port.Robot` around a raw one.
+
+    `drive`, `submit`, `tick` and `halt` may be called from any thread; the lock they share is never held while a
+    sensor is read or time passes, so a watchdog thread that calls `tick` waits for nothing but the base.
+    """
+
+    def __init__(self, robot: Robot) -> None:
+        self._robot = robot
+        self._governor = Governor(robot.profile)
+        self._lock = threading.Lock()
+
+    @property
+    def profile(self) -> RobotProfile:
+        """The robot's profile."""
+        return self._robot.profile
+
+    @property
+    def refused(self) -> dict[str, int]:
+        """How many commands were refused, by reason."""
+        return dict(self._governor.refused)
+
+    def open(self) -> None:
+        """Bring the devices up."""
+        self._robot.open()
+
+    def read(self) -> Observation:
+        """Return the newest of every sensor."""
+        return self._robot.read()
+
+    def now(self) -> float:
+        """Seconds on the robot's clock."""
+        return self._robot.now()
+
+    def drive(self, command: Command) -> Applied:
+        """Submit a command and let it act at once."""
+        with self._lock:
+            self._governor.submit(command, self._robot.now())
+            return self._actuate()
+
+    def submit(self, command: Command) -> None:
+        """Hand in a command that acts at the next `tick` or `drive`."""
+        with self._lock:
+            self._governor.submit(command, self._robot.now())
+
+    def tick(self) -> Applied:
+        """Let time-outs strike and pass what remains to the base. Call it at 50 Hz where time passes by itself."""
+        with self._lock:
+            return self._actuate()
+
+    def wait(self, until_s: float) -> None:
+        """Let the robot's time pass, with the watchdog awake."""
+        # It looks before each slice and not after the last: what the caller does next may be the command it misses.
+        while (now_s := self._robot.now()) < until_s - ROUNDING_S:
+            self.tick()
+            self._robot.wait(min(now_s + SLICE_S, until_s))
+
+    def halt(self) -> Applied:
+        """Stop now, forget every command."""
+        with self._lock:
+            self._governor.halt()
+            return self._actuate()
+
+    def close(self) -> None:
+        """Stop the wheels, then let go of the devices."""
+        try:
+            self.halt()
+        finally:
+            self._robot.close()
+
+    def _actuate(self) -> Applied:
+        allowed = self._governor.tick(self._robot.now())
+        got = self._robot.drive(Command(allowed.twist, allowed.stamp_s, allowed.source, allowed.answers))
+        return replace(allowed, twist=got.twist, clamps=allowed.clamps + got.clamps)

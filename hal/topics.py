@@ -1,0 +1,84 @@
+"""The one table of topics: key, message, rate, age at which it counts as stale, and how it travels.
+
+Keys lie below the robot's name. Whether a value is fresh is decided from this table and nowhere else.
+"""
+
+from dataclasses import dataclass
+
+from zenoh import CongestionControl, Priority, Reliability
+
+from hal.codec import ros_type_of
+from hal.messages import (
+    Applied,
+    BatteryState,
+    Clock,
+    CompressedImage,
+    CourseState,
+    Decision,
+    Imu,
+    LaserScan,
+    Odometry,
+    Range,
+    Twist,
+)
+
+
+@dataclass(frozen=True, slots=True)
+class Qos:
+    """How samples travel. `latched`: a late reader gets the last one."""
+
+    reliability: Reliability
+    priority: Priority
+    express: bool = False
+    latched: bool = False
+    congestion: CongestionControl = CongestionControl.DROP
+
+
+# What must be new or not come at all: over UDP, past everything else.
+URGENT = Qos(Reliability.BEST_EFFORT, Priority.REAL_TIME, express=True)
+SENSOR = Qos(Reliability.BEST_EFFORT, Priority.DATA_HIGH, express=True)
+# An image is many packets, so over TCP, and it gives way first.
+PICTURE = Qos(Reliability.RELIABLE, Priority.DATA_LOW)
+REPORT = Qos(Reliability.RELIABLE, Priority.DATA)
+LATCHED = Qos(Reliability.RELIABLE, Priority.DATA, latched=True)
+# Lockstep: nothing is lost and nothing overtakes, so one link and one priority. To wait is harmless when time waits.
+LOCKSTEP = Qos(Reliability.RELIABLE, Priority.DATA, express=True, congestion=CongestionControl.BLOCK)
+
+
+@dataclass(frozen=True, slots=True)
+class Topic:
+    """One line of the table."""
+
+    key: str
+    kind: type
+    rate_hz: float
+    max_age_s: float
+    qos: Qos
+
+    @property
+    def ros_type(self) -> str:
+        """Name of the ROS type of the payload."""
+        return ros_type_of(self.kind)
+
+
+SCAN = Topic("scan", LaserScan, 10.0, 0.3, SENSOR)
+CAMERA = Topic("camera/color/image_raw/compressed", CompressedImage, 30.0, 0.3, PICTURE)
+ODOM = Topic("odom", Odometry, 20.0, 0.3, URGENT)
+IMU = Topic("imu", Imu, 10.0, 0.3, SENSOR)
+RANGES = {
+    frame_id: Topic(frame_id.replace("_", "/"), Range, 10.0, 0.3, SENSOR)
+    for frame_id in ("range_fl", "range_fr", "range_rl", "range_rr")
+}
+BATTERY = Topic("battery", BatteryState, 1.0, 5.0, LATCHED)
+CMD_VEL = Topic("cmd_vel", Twist, 20.0, 0.3, URGENT)
+TELEOP = Topic("cmd_vel/teleop", Twist, 30.0, 0.2, URGENT)
+APPLIED = Topic("cmd_vel/applied", Applied, 20.0, 0.3, URGENT)
+DECISION = Topic("lira/decision", Decision, 5.0, 1.0, REPORT)
+SIM_STATE = Topic("sim/state", CourseState, 20.0, 0.3, SENSOR)
+CLOCK = Topic("clock", Clock, 20.0, 0.3, URGENT)  # lockstep only: closes an observation
+
+TOPICS = (SCAN, CAMERA, ODOM, IMU, *RANGES.values(), BATTERY, CMD_VEL, TELEOP, APPLIED, DECISION, SIM_STATE, CLOCK)
+
+# Keys that answer queries.
+INFO = "info"
+RESET = "sim/reset"

@@ -1,0 +1,23 @@
+"""The attachment survives the wire; what others attach is not mistaken for ours."""
+
+import random
+
+import pytest
+
+from hal.attachment import Attachment, parse_attachment
+
+
+@pytest.mark.parametrize(
+    "attachment",
+    [Attachment(0, 0, 0), Attachment(2**64 - 1, 2**64 - 1, -(2**63), 2**63 - 1, True), Attachment(1, 2, 3, 4, False)],
+)
+def test_round_trip(attachment):
+    assert parse_attachment(attachment.to_bytes()) == attachment
+
+
+def test_foreign_attachments_are_none():
+    good = Attachment(1, 2, 3).to_bytes()
+    rng = random.Random(5)
+    foreign = [None, b"", b"LIR1", good[:-1], good + b"\0", b"LIR2" + good[4:], bytes(33), bytes(len(good))]
+    foreign += [rng.randbytes(rng.randrange(80)) for _ in range(200)]
+    assert [parse_attachment(data) for data in foreign] == [None] * len(foreign)

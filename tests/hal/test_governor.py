@@ -1,0 +1,303 @@
+"""The governor over every state and event, its rules one by one, and properties over any sequence."""
+
+import math
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from hal.governor import AHEAD_S, GRACE_S, TRANSITIONS, Event, Governor, State, is_neutral
+from hal.messages import STOP, Command, Reason, Source, Twist
+from hal.profile import STOP_BUDGET_S, load_profile
+
+PROFILE = load_profile("thesis-sim")
+POLICY_S, TELEOP_S = PROFILE.control.policy_timeout_s, PROFILE.control.teleop_timeout_s
+GO, TURN = Twist(0.5, 0.0), Twist(0.0, 0.5)
+P, T = Source.POLICY, Source.TELEOP
+
+
+class Desk:
+    """Talks to a governor at explicit times."""
+
+    def __init__(self) -> None:
+        self.governor = Governor(PROFILE)
+
+    def at(self, now_s, *commands):
+        for command in commands:
+            self.governor.submit(command, now_s)
+        return self.governor.tick(now_s)
+
+    def armed(self, now_s=0.0, source=P):
+        assert self.at(now_s, Command(STOP, now_s, source)).reason is Reason.OK
+        return self
+
+
+def policy(twist, stamp_s, answers=-1):
+    return Command(twist, stamp_s, P, answers)
+
+
+def teleop(twist, stamp_s, released=False):
+    return Command(twist, stamp_s, T, released=released)
+
+
+def test_the_table_covers_every_state_and_event():
+    assert set(TRANSITIONS) == {(state, event) for state in State for event in Event}
+
+
+EXPECTED = {
+    Event.NEUTRAL: ((State.ARMED, Reason.OK), (State.ARMED, Reason.OK)),
+    Event.MOTION: ((State.STOPPED, Reason.NEUTRAL_FIRST), (State.ARMED, Reason.OK)),
+    Event.EXPIRED: ((State.STOPPED, Reason.STALE), (State.STOPPED, Reason.STALE)),
+    Event.BROKEN: ((State.STOPPED, Reason.REFUSED), (State.STOPPED, Reason.REFUSED)),
+    Event.IGNORED: ((State.STOPPED, Reason.REFUSED), (State.ARMED, Reason.OK)),
+    Event.HALTED: ((State.STOPPED, Reason.NO_COMMAND), (State.STOPPED, Reason.NO_COMMAND)),
+}
+
+
+@pytest.mark.parametrize("event", Event)
+@pytest.mark.parametrize("armed", [False, True])
+def test_every_event_in_every_state(event, armed):
+    desk = Desk()
+    desk.at(0.0, policy(STOP if armed else GO, 0.0))
+    assert desk.governor.state is (State.ARMED if armed else State.STOPPED)
+    happen = {
+        Event.NEUTRAL: lambda: desk.at(0.1, policy(STOP, 0.1)),
+        Event.MOTION: lambda: desk.at(0.1, policy(GO, 0.1)),
+        Event.EXPIRED: lambda: desk.at(1.0),
+        Event.BROKEN: lambda: desk.at(0.1, policy(Twist(math.nan, 0.0), 0.1)),
+        Event.IGNORED: lambda: desk.at(0.1, policy(GO, -1.0)),
+        Event.HALTED: lambda: (desk.governor.halt(), desk.at(0.1))[1],
+    }
+    applied = happen[event]()
+    assert (desk.governor.state, applied.reason) == EXPECTED[event][armed]
+    if desk.governor.state is State.STOPPED:
+        assert (applied.twist, applied.source) == (STOP, Source.NONE)
+
+
+def test_at_the_start_nothing_moves_and_it_says_why():
+    applied = Desk().at(5.0)
+    assert (applied.twist, applied.source, applied.reason) == (STOP, Source.NONE, Reason.NO_COMMAND)
+    assert applied.answers == -1
+    assert math.isnan(applied.command_age_s)
+
+
+def test_a_neutral_command_comes_first():
+    desk = Desk()
+    assert desk.at(0.0, policy(GO, 0.0)).reason is Reason.NEUTRAL_FIRST
+    assert desk.at(0.1, policy(STOP, 0.1)).reason is Reason.OK
+    assert desk.at(0.2, policy(GO, 0.2)).twist == GO
+
+
+def test_what_is_applied_names_its_command():
+    applied = Desk().armed().at(0.15, policy(GO, 0.1, answers=7))
+    assert (applied.source, applied.reason, applied.answers, applied.clamps) == (P, Reason.OK, 7, ())
+    assert applied.command_age_s == pytest.approx(0.05)
+    assert applied.stamp_s == 0.15
+
+
+def test_the_watchdog_strikes_at_the_time_out_and_wants_a_neutral_command():
+    desk = Desk().armed()
+    assert desk.at(0.1, policy(GO, 0.1)).twist == GO
+    assert desk.at(0.1 + POLICY_S - 0.01).twist == GO
+    assert desk.at(0.1 + POLICY_S).reason is Reason.STALE
+    assert desk.at(1.0, policy(GO, 1.0)).reason is Reason.NEUTRAL_FIRST
+    desk.armed(1.1)
+    assert desk.at(1.2, policy(GO, 1.2)).twist == GO
+
+
+def test_silence_after_a_neutral_command_wants_a_neutral_command_again():
+    desk = Desk().armed()
+    assert desk.at(10.0, policy(GO, 10.0)).reason is Reason.NEUTRAL_FIRST
+
+
+def test_a_long_gap_counts_as_silence_even_without_a_tick_in_it():
+    desk = Desk().armed()
+    desk.at(0.1, policy(GO, 0.1))
+    assert desk.at(0.1 + POLICY_S + GRACE_S, policy(GO, 0.1 + POLICY_S + GRACE_S)).reason is Reason.NEUTRAL_FIRST
+
+
+def test_a_stream_at_exactly_the_time_out_is_not_cut_by_rounding():
+    desk = Desk().armed(0.0, T)
+    for step in range(1, 50):
+        now_s = step * TELEOP_S
+        assert desk.at(now_s, teleop(GO, now_s)).twist == GO
+
+
+@pytest.mark.parametrize(("linear", "angular", "clamps"), [
+    (9.0, 0.5, ("linear",)),
+    (-9.0, 0.5, ("linear",)),
+    (0.5, 9.0, ("angular",)),
+    (1e308, -1e308, ("linear", "angular")),
+    (0.5, 0.5, ()),
+])  # fmt: skip
+def test_limits_and_their_names(linear, angular, clamps):
+    applied = Desk().armed().at(0.1, policy(Twist(linear, angular), 0.1))
+    assert applied.clamps == clamps
+    assert abs(applied.twist.linear_m_s) <= PROFILE.base.max_linear_m_s
+    assert abs(applied.twist.angular_rad_s) <= PROFILE.base.max_angular_rad_s
+    assert math.copysign(1.0, applied.twist.linear_m_s) == math.copysign(1.0, linear)
+
+
+@pytest.mark.parametrize("bad", [math.nan, math.inf, -math.inf])
+@pytest.mark.parametrize("field", ["linear_m_s", "angular_rad_s"])
+def test_non_finite_stops_until_neutral(bad, field):
+    desk = Desk().armed()
+    desk.at(0.1, policy(GO, 0.1))
+    values = {"linear_m_s": 0.0, "angular_rad_s": 0.0} | {field: bad}
+    applied = desk.at(0.15, policy(Twist(**values), 0.15))
+    assert (applied.twist, applied.reason) == (STOP, Reason.REFUSED)
+    assert desk.governor.refused == {"not finite": 1}
+    assert desk.at(0.2, policy(GO, 0.2)).reason is Reason.NEUTRAL_FIRST
+
+
+def test_a_broken_policy_does_not_stop_a_person():
+    desk = Desk().armed(0.0, T)
+    assert desk.at(0.1, teleop(GO, 0.1), policy(Twist(math.nan, 0.0), 0.1)).twist == GO
+
+
+def test_a_broken_hand_stops_policy_too():
+    desk = Desk().armed()
+    applied = desk.at(0.1, policy(GO, 0.1), teleop(Twist(math.nan, 0.0), 0.1))
+    assert (applied.twist, applied.reason) == (STOP, Reason.REFUSED)
+
+
+@pytest.mark.parametrize(("stamp_s", "why"), [
+    (10.0 - POLICY_S, "late"),
+    (9.9, "out of order"),
+    (10.0 + AHEAD_S + 0.01, "from the future"),
+    (10.0 + 3600.0, "from the future"),
+    (math.nan, "no time"),
+    (math.inf, "no time"),
+])  # fmt: skip
+def test_late_replayed_and_future_commands_are_refused_and_counted(stamp_s, why):
+    desk = Desk().armed(9.7 if why == "late" else 9.8)
+    if why != "late":
+        desk.at(9.95, policy(TURN, 9.95))
+    applied = desk.at(10.0, policy(GO, stamp_s))
+    assert applied.twist == (STOP if why == "late" else TURN)
+    assert desk.governor.refused == {why: 1}
+
+
+def test_a_command_without_a_source_is_refused():
+    desk = Desk().armed()
+    assert desk.at(0.1, Command(GO, 0.1, Source.NONE)).twist == STOP
+    assert desk.governor.refused == {"no source": 1}
+
+
+def test_a_stamp_ahead_of_the_clock_does_not_stretch_the_time_out():
+    desk = Desk().armed()
+    assert desk.at(0.1, policy(GO, 0.1 + AHEAD_S)).twist == GO
+    assert desk.at(0.1 + POLICY_S).reason is Reason.STALE
+
+
+def test_a_take_over_and_its_end_need_no_neutral_command():
+    desk = Desk().armed()
+    assert desk.at(0.1, policy(GO, 0.1)).source is P
+    taken = desk.at(0.15, teleop(TURN, 0.15))
+    assert (taken.twist, taken.source) == (TURN, T)
+    assert desk.at(0.2, policy(GO, 0.2)).twist == TURN
+    back = desk.at(0.3, teleop(STOP, 0.3, released=True), policy(GO, 0.3))
+    assert (back.twist, back.source) == (GO, P)
+
+
+def test_a_released_hand_holds_zero_until_policy_commands():
+    desk = Desk().armed(0.0, T)
+    assert desk.at(0.1, teleop(GO, 0.1)).twist == GO
+    assert desk.at(0.2, teleop(GO, 0.2, released=True)).twist == STOP
+    assert desk.at(0.3, policy(GO, 0.3)).twist == GO
+
+
+def test_after_a_release_into_silence_a_neutral_command_comes_first():
+    desk = Desk().armed(0.0, T)
+    desk.at(0.1, teleop(STOP, 0.1, released=True))
+    assert desk.at(0.1 + TELEOP_S).reason is Reason.STALE
+    assert desk.at(0.5, policy(GO, 0.5)).reason is Reason.NEUTRAL_FIRST
+
+
+def test_a_hand_that_vanishes_in_motion_does_not_hand_over_to_policy():
+    desk = Desk().armed()
+    desk.at(0.1, policy(GO, 0.1), teleop(TURN, 0.1))
+    now_s = 0.1
+    while now_s < 0.1 + TELEOP_S - 0.01:
+        assert desk.at(now_s, policy(GO, now_s)).twist == TURN
+        now_s += 0.02
+    now_s = 0.1 + TELEOP_S
+    assert desk.at(now_s, policy(GO, now_s)).twist == STOP
+    for _ in range(50):
+        now_s += 0.02
+        assert desk.at(now_s, policy(GO, now_s)).reason is Reason.NEUTRAL_FIRST
+    desk.armed(now_s + 0.02)
+    assert desk.at(now_s + 0.04, policy(GO, now_s + 0.04)).twist == GO
+
+
+def test_a_hand_that_goes_silent_after_zero_hands_over_to_policy():
+    desk = Desk().armed()
+    desk.at(0.05, policy(GO, 0.05), teleop(TURN, 0.05))
+    assert desk.at(0.1, teleop(STOP, 0.1), policy(GO, 0.1)).twist == STOP
+    assert desk.at(0.1 + TELEOP_S - 0.01, policy(GO, 0.25)).twist == STOP
+    assert desk.at(0.1 + TELEOP_S).twist == GO
+
+
+def test_policy_cannot_arm_what_a_hand_keeps_in_motion():
+    desk = Desk()
+    assert desk.at(0.0, teleop(GO, 0.0), policy(STOP, 0.0)).reason is Reason.NEUTRAL_FIRST
+
+
+def test_every_silence_ends_within_the_stop_budget():
+    for command, timeout_s in ((policy(GO, 0.1), POLICY_S), (teleop(GO, 0.1), TELEOP_S)):
+        desk = Desk().armed(0.0, command.source)
+        assert desk.at(0.1, command).twist == GO
+        assert timeout_s + GRACE_S < STOP_BUDGET_S
+        assert desk.at(0.1 + timeout_s).twist == STOP
+
+
+NUMBERS = st.one_of(st.sampled_from([0.0, 0.5, -0.5, math.nan, math.inf, 1e308, 1e-7]), st.floats(-3.0, 3.0))
+ACTIONS = st.lists(
+    st.tuples(
+        st.sampled_from([0.0, 0.02, 0.05, 0.15, 0.2, 0.25, 1.0]),  # time that passes first
+        st.one_of(
+            st.none(),
+            st.builds(
+                Command,
+                st.one_of(st.just(STOP), st.builds(Twist, NUMBERS, NUMBERS)),
+                st.sampled_from([0.0, 0.0, 0.0, -0.1, -0.3, 0.05, 1.0, math.nan]),  # stamp relative to now
+                st.sampled_from(Source),
+                st.integers(-1, 9),
+                st.booleans(),
+            ),
+        ),
+    ),
+    max_size=40,
+)
+
+
+@settings(max_examples=300, deadline=None)
+@given(ACTIONS)
+def test_no_sequence_of_commands_breaks_a_promise(actions):
+    governor = Governor(PROFILE)
+    now_s = 100.0
+    newest_s = {P: -math.inf, T: -math.inf}  # the newest finite command that may be obeyed
+    neutral_since_stop = False
+    for passed_s, wish in actions:
+        now_s += passed_s
+        if wish is not None:
+            stamp_s = now_s + wish.stamp_s
+            command = Command(wish.twist, stamp_s, wish.source, wish.answers, wish.released)
+            governor.submit(command, now_s)
+            if wish.source in newest_s and math.isfinite(stamp_s):
+                newest_s[wish.source] = max(newest_s[wish.source], min(stamp_s, now_s))
+            neutral_since_stop |= is_neutral(wish.twist) or wish.released
+        applied = governor.tick(now_s)
+        moving = not is_neutral(applied.twist)
+        assert abs(applied.twist.linear_m_s) <= PROFILE.base.max_linear_m_s
+        assert abs(applied.twist.angular_rad_s) <= PROFILE.base.max_angular_rad_s
+        if governor.state is State.STOPPED:
+            neutral_since_stop = False
+            assert not moving
+            assert applied.reason is not Reason.OK
+        if moving:
+            assert neutral_since_stop
+            assert applied.reason is Reason.OK
+            timeout_s = POLICY_S if applied.source is P else TELEOP_S
+            assert 0.0 <= applied.command_age_s < timeout_s
+            assert newest_s[applied.source] > now_s - timeout_s
