@@ -67,7 +67,7 @@ class GovernedRobot:
         # It looks before each slice and not after the last: what the caller does next may be the command it misses.
         while (now_s := self._robot.now()) < until_s - ROUNDING_S:
             self.tick()
-            self._robot.wait(min(now_s + SLICE_S, until_s))
+            self._robot.wait(until_s if until_s - now_s < SLICE_S + ROUNDING_S else now_s + SLICE_S)
 
     def halt(self) -> Applied:
         """Stop now, forget every command."""
