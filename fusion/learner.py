@@ -2,6 +2,7 @@
 
 import copy
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 import torch
@@ -53,8 +54,7 @@ class Learner:
         self._random = np.random.default_rng(seed)
         self._inputs: list[_Rows] = []
         self._targets = _Rows((3,), torch.float32)  # linear, angular, weight
-        trained = [parameter for parameter in self._network.parameters() if parameter.requires_grad]
-        self._adam = torch.optim.Adam(trained, lr=learning_rate, fused=True)
+        self._learning_rate = learning_rate
 
     def __len__(self) -> int:
         return self._targets.count
@@ -83,6 +83,12 @@ class Learner:
     def weights(self) -> Weights:
         """Copy the network's weights."""
         return self._network.weights()
+
+    @cached_property
+    def _adam(self) -> torch.optim.Adam:
+        """Made by whoever trains: PyTorch's optimisers load for seconds and take 80 MB."""
+        trained = [parameter for parameter in self._network.parameters() if parameter.requires_grad]
+        return torch.optim.Adam(trained, lr=self._learning_rate, fused=True)
 
     def _update(self, pick: Tensor) -> float:
         inputs = [store.rows[pick] for store in self._inputs]

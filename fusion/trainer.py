@@ -5,17 +5,21 @@ between two decisions. With `adopt_after_s` that happens at the first poll so lo
 machine's speed, so that a run on simulated time can be repeated; without, as soon as the weights are there.
 """
 
+import math
 import multiprocessing
 import os
 import pickle
 import signal
 from multiprocessing.connection import Connection
+from multiprocessing.context import SpawnContext
 
+import numpy as np
 import torch
 
 from fusion.learner import Label, Learner
-from fusion.networks import Weights
+from fusion.networks import IMAGE_PX, FusionNet, Weights
 from hal.errors import LiraError
+from hal.messages import FloatArray
 
 NICENESS = 5
 CLOSE_TIMEOUT_S = 2.0
@@ -70,10 +74,10 @@ class ProcessTrainer:
         self.pending = False
         context = multiprocessing.get_context("spawn")
         self._pipe, theirs = context.Pipe()
+        self._shared = _SharedWeights(context, learner.weights())
         # Pickled here: multiprocessing would share the tensors' memory between the processes.
-        self._process = context.Process(
-            target=_serve, args=(pickle.dumps(learner), theirs), name="lira-trainer", daemon=True
-        )
+        arguments = (pickle.dumps(learner), theirs, self._shared)
+        self._process = context.Process(target=_serve, args=arguments, name="lira-trainer", daemon=True)
         # Ctrl-C reaches every process of the terminal; the trainer's end is its parent's to decide.
         before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
         try:
@@ -105,10 +109,10 @@ class ProcessTrainer:
         due = self.pending and self._adopt_after_s is not None
         if now_s < self._due_s if due else not self._pipe.poll():
             return None
-        weights = self._receive()
+        self._receive()
         self.pending = False
         self._hand_over()
-        return weights
+        return self._shared.read()
 
     def close(self) -> None:
         """End the process, in bounded time."""
@@ -130,31 +134,59 @@ class ProcessTrainer:
         except BrokenPipeError:
             return
 
-    def _receive(self) -> Weights | None:
+    def _receive(self) -> None:
+        """Wait for word from the process: that it is ready, or that the weights are there."""
         try:
-            weights: Weights | None = self._pipe.recv()
+            self._pipe.recv()
         except (EOFError, ConnectionResetError) as error:
             self._process.join(CLOSE_TIMEOUT_S)
             raise LiraError(
                 f"the trainer process has died (exit code {self._process.exitcode})",
                 "Start again: the demonstration log has every label.",
             ) from error
-        return weights
 
 
-def _serve(pickled: bytes, pipe: Connection) -> None:
+class _SharedWeights:
+    """Weights in memory that two processes share: through the pipe, megabytes would keep the control loop waiting."""
+
+    def __init__(self, context: SpawnContext, like: Weights) -> None:
+        self._shapes = {name: array.shape for name, array in like.items()}
+        self._memory = context.RawArray("f", sum(array.size for array in like.values()))
+
+    def write(self, weights: Weights) -> None:
+        np.concatenate([weights[name].ravel() for name in self._shapes], out=self._flat())
+
+    def read(self) -> Weights:
+        sizes = [math.prod(shape) for shape in self._shapes.values()]
+        parts = np.split(self._flat().copy(), np.cumsum(sizes)[:-1])
+        return {name: part.reshape(self._shapes[name]) for name, part in zip(self._shapes, parts, strict=True)}
+
+    def _flat(self) -> FloatArray:
+        return np.frombuffer(self._memory, np.float32)
+
+
+def _serve(pickled: bytes, pipe: Connection, shared: _SharedWeights) -> None:
     """Keep labels and train until the other end of the pipe is closed. None asks for a training step."""
     os.nice(NICENESS)
     torch.set_num_threads(1)
+    _warm_up()
     learner: Learner = pickle.loads(pickled)
-    pipe.send(None)  # ready
     try:
+        pipe.send(None)  # ready
         while True:
             label = pipe.recv()
-            if label is None:
-                learner.train_step()
-                pipe.send(learner.weights())
-            else:
+            if label is not None:
                 learner.add(label)
+                continue
+            learner.train_step()
+            shared.write(learner.weights())
+            pipe.send(None)
     except (EOFError, BrokenPipeError, ConnectionResetError):
         return
+
+
+def _warm_up() -> None:
+    """Train a small network for nothing: PyTorch loads much of itself at the first step, which takes seconds."""
+    learner = Learner(FusionNet(bins=8, filters=4), seed=0, frozen_trunks=False)
+    learner.add(Label(np.zeros(8, np.float32), np.zeros((IMAGE_PX, IMAGE_PX), np.float32), (0.0, 0.0), "none"))
+    learner.train_step()
