@@ -5,7 +5,6 @@ The EGL plugin draws with OpenGL and is much faster for large pictures.
 """
 
 import math
-from typing import Literal
 
 import cv2
 import numpy as np
@@ -14,13 +13,11 @@ from hal.messages import ByteArray
 from hal.profile import Camera
 from sim_backend.scene import Scene
 
-Renderer = Literal["auto", "tiny", "egl"]
-
 NEAR_M = 0.02
 FAR_M = 60.0
 # Up to this many pixels TinyRenderer wins, and its picture is worth rendering larger.
 SMALL_PX = 160 * 120
-OVERSAMPLE_WIDE = 4
+OVERSAMPLE_WIDE = 3
 OVERSAMPLE_HIGH = 2
 # TinyRenderer takes 60 ms for 640x480: what it draws of a large picture is halved until it has this many pixels.
 TINY_LIMIT_PX = 320 * 240
@@ -33,7 +30,7 @@ class PinholeCamera:
 
     def __init__(self, camera: Camera, scene: Scene, sky_gray: int) -> None:
         self._camera = camera
-        self._scene = scene
+        self.scene = scene
         self._sky_gray = sky_gray
         self._width_px, self._height_px, self._average = render_size(camera, egl=scene.egl)
         self._projection = projection_matrix(camera)
@@ -50,25 +47,18 @@ class PinholeCamera:
         }
 
     def render(self, x_m: float, y_m: float, yaw_rad: float) -> ByteArray:
-        """Picture from a robot at this pose: uint8 [height, width, 3]."""
+        """Picture from a robot at this pose, gray like everything in a world: uint8 [height, width]."""
         view = view_matrix(self._camera, x_m, y_m, yaw_rad)
-        _, _, pixels, depth, _ = self._scene.bullet.getCameraImage(
+        _, _, pixels, depth, _ = self.scene.bullet.getCameraImage(
             self._width_px, self._height_px, view, self._projection, **self._how
         )
-        shape = (self._height_px, self._width_px)
-        picture: ByteArray = np.array(pixels, dtype=np.uint8).reshape(*shape, 4)[..., :3]
-        # Where nothing was drawn is sky, and both renderers have a white of their own there.
-        picture[np.asarray(depth).reshape(shape) >= 1.0] = self._sky_gray
+        picture: ByteArray = np.array(pixels[..., 0])
+        # Where nothing was drawn is sky, and each renderer has a shade of its own there.
+        picture[depth >= 1.0] = self._sky_gray
         if self._average:
             size = (self._camera.width_px, self._camera.height_px)
             picture = np.asarray(cv2.resize(picture, size, interpolation=cv2.INTER_AREA), dtype=np.uint8)
         return picture
-
-
-def wants_egl(camera: Camera, renderer: Renderer) -> bool:
-    """Decide whether to try OpenGL."""
-    large = camera.width_px * camera.height_px > SMALL_PX
-    return renderer == "egl" or (renderer == "auto" and large)
 
 
 def render_size(camera: Camera, *, egl: bool) -> tuple[int, int, bool]:
@@ -97,31 +87,31 @@ def view_matrix(camera: Camera, x_m: float, y_m: float, yaw_rad: float) -> list[
     """OpenGL view, column by column, of the camera on a robot at this pose."""
     cos, sin = math.cos(yaw_rad), math.sin(yaw_rad)
     down, level = math.sin(camera.pitch_rad), math.cos(camera.pitch_rad)
-    eye = np.array([x_m + camera.x_m * cos, y_m + camera.x_m * sin, camera.z_m])
-    right = np.array([sin, -cos, 0.0])
-    ahead = np.array([cos * level, sin * level, -down])
-    up = np.array([cos * down, sin * down, level])
-    matrix = np.eye(4)
-    matrix[:3, :3] = right, up, -ahead
-    matrix[:3, 3] = -matrix[:3, :3] @ eye
-    flat: list[float] = matrix.T.ravel().tolist()
-    return flat
+    eye_x, eye_y, eye_z = x_m + camera.x_m * cos, y_m + camera.x_m * sin, camera.z_m
+    forward = cos * eye_x + sin * eye_y
+    return [
+        *(sin, cos * down, -cos * level, 0.0),
+        *(-cos, sin * down, -sin * level, 0.0),
+        *(0.0, level, down, 0.0),
+        *(cos * eye_y - sin * eye_x, -down * forward - level * eye_z, level * forward - down * eye_z, 1.0),
+    ]
 
 
 def add_noise(picture: ByteArray, noise_gray: float, rng: np.random.Generator) -> ByteArray:
-    """Add normal noise of a standard deviation in gray levels, the same for the three colours of a pixel."""
+    """Add normal noise of a standard deviation in gray levels."""
     if noise_gray == 0.0:
         return picture
-    noise = rng.standard_normal(picture.shape[:2], dtype=np.float32)[..., None] * noise_gray
+    noise = rng.standard_normal(picture.shape, dtype=np.float32) * noise_gray
     noisy: ByteArray = np.clip(np.rint(picture + noise), 0, 255).astype(np.uint8)
     return noisy
 
 
 def encode_jpeg(picture: ByteArray) -> bytes:
-    """Encode rgb8 as JPEG, at the best of a few qualities that stays below what fits on the link."""
+    """Encode a gray picture as a JPEG in colour, at the best of a few qualities that fits on the link."""
+    colour = cv2.cvtColor(picture, cv2.COLOR_GRAY2BGR)
     data = b""
     for quality in JPEG_QUALITIES:
-        _, encoded = cv2.imencode(".jpg", picture[..., ::-1], [cv2.IMWRITE_JPEG_QUALITY, quality])
+        _, encoded = cv2.imencode(".jpg", colour, [cv2.IMWRITE_JPEG_QUALITY, quality])
         data = encoded.tobytes()
         if len(data) < JPEG_LIMIT_BYTES:
             break

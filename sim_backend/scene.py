@@ -7,6 +7,7 @@ invisible as the thesis has it.
 
 import ctypes
 import importlib.util
+import math
 import os
 import sys
 import tempfile
@@ -26,12 +27,9 @@ FLOOR_M = 200.0
 # High enough over the floor not to flicker into it far away, too low to matter to the camera.
 PAINT_HEIGHT_M = 0.003
 PAINT_STEP_M = 0.3
-UNDERGROUND = (0.0, 0.0, -1000.0)
-UPRIGHT = (0.0, 0.0, 0.0, 1.0)
 
 # Corners [n, 3] and the triangles between them, three indices each.
 Mesh = tuple[Floats, list[int]]
-Shape = tuple[float, float, float, int]
 
 
 def import_pybullet() -> ModuleType:
@@ -47,19 +45,23 @@ def import_pybullet() -> ModuleType:
 
 @contextmanager
 def quiet() -> Iterator[None]:
-    """Keep what pybullet prints from C out of the standard output, which may be a report that a program reads."""
+    """Keep what pybullet prints from C off the screen and out of a report that a program reads."""
     libc = ctypes.CDLL(None)
     sys.stdout.flush()
+    sys.stderr.flush()
     libc.fflush(None)
-    kept = os.dup(1)
+    kept = [os.dup(stream) for stream in (1, 2)]
+    nowhere = os.open(os.devnull, os.O_WRONLY)
     try:
-        with open(os.devnull, "wb") as nowhere:  # noqa: PTH123
-            os.dup2(nowhere.fileno(), 1)
+        for stream in (1, 2):
+            os.dup2(nowhere, stream)
         yield
     finally:
         libc.fflush(None)
-        os.dup2(kept, 1)
-        os.close(kept)
+        for stream, copy in zip((1, 2), kept, strict=True):
+            os.dup2(copy, stream)
+            os.close(copy)
+        os.close(nowhere)
 
 
 class Scene:
@@ -73,24 +75,23 @@ class Scene:
         self.client: int = self.bullet.connect(self.bullet.DIRECT)
         # Before the first shape: the plugin learns of shapes as they are made.
         self.egl = egl and self._load_egl()
-        self._boxes: dict[Shape, list[int]] = {}
-        world = layout.world
-        self._draw(floor_mesh(), world.ground_gray)
-        if world.line is not None:
-            self._draw(ribbon_mesh(layout.curve, world.line), world.line.gray)
         self.arrange(layout)
 
     def arrange(self, layout: Layout) -> None:
-        """Move the boxes to where another layout of the same world has them. Boxes are reused, so this is cheap."""
-        spare = {shape: list(bodies) for shape, bodies in self._boxes.items()}
+        """Build everything anew from a layout: cheap, and nothing is left of the last one."""
+        bullet, world = self.bullet, layout.world
+        bullet.resetSimulation(physicsClientId=self.client)
+        # Or pybullet keeps every mesh file it has ever read.
+        bullet.setPhysicsEngineParameter(enableFileCaching=0, physicsClientId=self.client)
+        self._draw(floor_mesh(), world.ground_gray)
+        if world.line is not None:
+            self._draw(ribbon_mesh(layout.curve, world.line), world.line.gray)
         for block in layout.blocks:
-            shape = (block.length_m, block.width_m, block.height_m, block.gray)
-            body = spare[shape].pop() if spare.get(shape) else self._box(shape)
-            self._move(body, (block.x_m, block.y_m, block.height_m / 2), yaw_quaternion(block))
-        for bodies in spare.values():
-            for body in bodies:
-                self._move(body, UNDERGROUND, UPRIGHT)
-        self.bullet.performCollisionDetection(physicsClientId=self.client)
+            self._solid(block)
+        # One picture for all boxes of a gray: TinyRenderer's time goes by bodies more than by triangles.
+        for gray in sorted({block.gray for block in layout.blocks}):
+            self._draw(join([box_mesh(block) for block in layout.blocks if block.gray == gray]), gray)
+        bullet.performCollisionDetection(physicsClientId=self.client)
 
     def close(self) -> None:
         """Let go of the client. May be called twice."""
@@ -107,15 +108,16 @@ class Scene:
             number: int = self.bullet.loadPlugin(plugin.origin, "_eglRendererPlugin", physicsClientId=self.client)
         return number >= 0
 
-    def _box(self, shape: Shape) -> int:
-        half = [edge / 2 for edge in shape[:3]]
-        solid = self.bullet.createCollisionShape(self.bullet.GEOM_BOX, halfExtents=half, physicsClientId=self.client)
-        body = self._draw(box_mesh(half), shape[3], solid)
-        self._boxes.setdefault(shape, []).append(body)
-        return body
+    def _solid(self, block: Block) -> None:
+        """Add a box that only the lidar meets."""
+        half = [block.length_m / 2, block.width_m / 2, block.height_m / 2]
+        shape = self.bullet.createCollisionShape(self.bullet.GEOM_BOX, halfExtents=half, physicsClientId=self.client)
+        position = (block.x_m, block.y_m, block.height_m / 2)
+        turn = (0.0, 0.0, math.sin(block.yaw_rad / 2), math.cos(block.yaw_rad / 2))
+        self.bullet.createMultiBody(0, shape, -1, position, turn, physicsClientId=self.client)
 
-    def _draw(self, mesh: Mesh, gray: int, solid: int = -1) -> int:
-        """Add a body; without a solid it is a picture only."""
+    def _draw(self, mesh: Mesh, gray: int) -> None:
+        """Add a picture that nothing meets."""
         # A little above the gray asked for: the renderers cut off where they should round.
         shade = min((gray + 0.25) / 255, 1.0)
         with tempfile.TemporaryDirectory() as folder:
@@ -128,16 +130,7 @@ class Scene:
                 rgbaColor=[shade, shade, shade, 1.0],
                 physicsClientId=self.client,
             )
-            body: int = self.bullet.createMultiBody(0, solid, visual, physicsClientId=self.client)
-        return body
-
-    def _move(self, body: int, position: tuple[float, float, float], turn: tuple[float, float, float, float]) -> None:
-        self.bullet.resetBasePositionAndOrientation(body, position, turn, physicsClientId=self.client)
-
-
-def yaw_quaternion(block: Block) -> tuple[float, float, float, float]:
-    """x, y, z, w of a turn about the vertical."""
-    return 0.0, 0.0, float(np.sin(block.yaw_rad / 2)), float(np.cos(block.yaw_rad / 2))
+            self.bullet.createMultiBody(0, -1, visual, physicsClientId=self.client)
 
 
 def floor_mesh() -> Mesh:
@@ -165,11 +158,24 @@ def ribbon_mesh(curve: Polyline, line: Line) -> Mesh:
     return np.array(edges), indices
 
 
-def box_mesh(half: list[float]) -> Mesh:
-    """The six faces of a box, two triangles each, facing out."""
-    corners = np.array([(x, y, z) for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)]) * np.array(half)
+def box_mesh(block: Block) -> Mesh:
+    """Six faces in their place, two triangles each, facing out."""
+    unit = np.array([(x, y, z) for x in (-0.5, 0.5) for y in (-0.5, 0.5) for z in (0.0, 1.0)])
+    along, across, up = (unit * (block.length_m, block.width_m, block.height_m)).T
+    cos, sin = math.cos(block.yaw_rad), math.sin(block.yaw_rad)
+    corners = np.stack([block.x_m + cos * along - sin * across, block.y_m + sin * along + cos * across, up], axis=-1)
     faces = [(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3)]
     return corners, [index for a, b, c, d in faces for index in (a, b, c, a, c, d)]
+
+
+def join(meshes: list[Mesh]) -> Mesh:
+    """Make one mesh of several."""
+    indices: list[int] = []
+    count = 0
+    for corners, own in meshes:
+        indices += [count + index for index in own]
+        count += len(corners)
+    return np.concatenate([corners for corners, _ in meshes]), indices
 
 
 def obj_text(mesh: Mesh) -> str:
