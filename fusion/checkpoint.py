@@ -2,6 +2,7 @@
 
 import json
 import os
+from contextlib import suppress
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
@@ -46,10 +47,10 @@ def save_checkpoint(path: Path, network: Network, checkpoint: Checkpoint) -> Non
             os.fsync(file.fileno())
         draft.replace(path)
     except OSError as error:
-        draft.unlink(missing_ok=True)
-        raise StorageError(f"cannot write {path}: {error.strerror}", "Free some space or choose another folder.") from (
-            error
-        )
+        with suppress(OSError):
+            draft.unlink()
+        what = f"cannot write {path}: {error.strerror}"
+        raise StorageError(what, "Free some space or choose another folder.") from error
 
 
 def load_checkpoint(path: Path) -> tuple[Network, Checkpoint]:

@@ -7,7 +7,6 @@ Layout, little-endian: a header (magic, version, bins, px, profile, CRC-32), the
 CRC-32 of its own. One size keeps a damaged record from hiding the ones behind it.
 """
 
-import errno
 import fcntl
 import os
 import struct
@@ -146,7 +145,7 @@ class DemonstrationLog:
             self._drain()
             os.fsync(self._file)
         except OSError as error:
-            raise self._failed(os.strerror(error.errno or 0)) from error
+            raise self._failed(error) from error
         finally:
             os.close(self._file)
             self._file = -1
@@ -164,18 +163,17 @@ class DemonstrationLog:
 
     def _write(self, data: bytes) -> None:
         """Write all of it or nothing."""
-        written, reason = 0, os.strerror(errno.ENOSPC)
+        written = 0
         try:
-            written = os.write(self._file, data)
+            while written < len(data):  # after a short write the next one says why
+                written += os.write(self._file, data[written:])
         except OSError as error:
-            reason = os.strerror(error.errno or 0)
-        if written < len(data):
             os.ftruncate(self._file, self._end)
-            raise self._failed(reason)
+            raise self._failed(error) from error
         self._end += written
 
-    def _failed(self, reason: str) -> StorageError:
-        what = f"cannot write to {self._path}: {reason}"
+    def _failed(self, error: OSError) -> StorageError:
+        what = f"cannot write to {self._path}: {error.strerror}"
         return StorageError(f"{what}; {len(self._unwritten)} labels wait in memory", "Free some space on that disk.")
 
     def _check_space(self) -> None:

@@ -110,11 +110,12 @@ class _Layout:
 def _layout(count: int, angle_min: float, increment: float, fov_rad: float, bins: int) -> _Layout:
     """Sort the beams of a scan into bins. Raises `SensorError` where they do not cover the field of view."""
     remedy = "Compare the lidar's settings with the [lidar] and [features] tables of the robot's profile."
-    if not (math.isfinite(angle_min) and math.isfinite(increment)) or increment == 0.0:
+    turn = 2 * math.pi
+    if not (abs(angle_min) <= 2 * turn and 0.0 < abs(increment) <= turn):  # nan is neither
         what = f"the scan's angles make no sense: angle_min {angle_min}, angle_increment {increment}"
         raise ReadingError("scan angles", what, remedy)
     step = abs(increment)
-    if count < 2 or count * step > 2 * math.pi + 1.5 * step:
+    if count < 2 or count * step > turn + 1.5 * step:
         what = f"a scan of {count} beams every {math.degrees(step):.3g} deg has the wrong length"
         raise ReadingError("scan length", what, remedy)
     width = fov_rad / bins
@@ -124,7 +125,7 @@ def _layout(count: int, angle_min: float, increment: float, fov_rad: float, bins
             f"{math.degrees(increment):.3g} deg do not cover the {math.degrees(fov_rad):.0f} deg ahead"
         )
         raise ReadingError("scan length", what, remedy)
-    angles = np.remainder(angle_min + increment * np.arange(count) + math.pi, 2 * math.pi) - math.pi
+    angles = np.remainder(angle_min + increment * np.arange(count) + math.pi, turn) - math.pi
     position = (angles + fov_rad / 2) / width
     inside = np.flatnonzero((position >= -EDGE_BINS) & (position <= bins + EDGE_BINS))
     index = np.clip(np.floor(position[inside] + EDGE_BINS), 0, bins - 1).astype(np.intp)

@@ -1,0 +1,106 @@
+import json
+
+import numpy as np
+import pytest
+from safetensors.numpy import save_file
+
+from fusion.checkpoint import Checkpoint, load_checkpoint, save_checkpoint
+from fusion.networks import CameraNet, FusionNet, LidarNet
+from hal.errors import StorageError
+
+SCAN = np.random.default_rng(0).random(101, dtype=np.float32)
+IMAGE = np.random.default_rng(1).random((32, 32), dtype=np.float32)
+
+
+def checkpoint(kind="fusion", **changes) -> Checkpoint:
+    fields = {"bins": 101, "filters": 16, "profile": "thesis-sim", "cruise": None, "provenance": "a test", "seed": 7}
+    return Checkpoint(kind, **(fields | changes))
+
+
+@pytest.mark.parametrize(
+    ("network", "about"),
+    [
+        (CameraNet(16, seed=1), checkpoint("camera", cruise=(0.98, -0.01))),
+        (CameraNet(8, px=24, seed=1), checkpoint("camera", filters=8, px=24)),
+        (LidarNet(101, seed=2), checkpoint("lidar", provenance='lira train-expert lidar "ä"')),
+        (FusionNet(101, 16, seed=3), checkpoint()),
+    ],
+)
+def test_what_is_saved_is_loaded(tmp_path, network, about):
+    path = tmp_path / "new" / "one.safetensors"
+    save_checkpoint(path, network, about)
+    loaded, found = load_checkpoint(path)
+    assert found == about
+    assert type(loaded) is type(network)
+    image = IMAGE[: about.px, : about.px].copy()
+    assert loaded.act(SCAN, image) == network.act(SCAN, image)
+    assert [entry.name for entry in path.parent.iterdir()] == ["one.safetensors"]
+
+
+def test_a_missing_checkpoint_says_how_to_make_one(tmp_path):
+    with pytest.raises(StorageError, match="there is no checkpoint") as refused:
+        load_checkpoint(tmp_path / "none.safetensors")
+    assert "train-expert" in refused.value.remedy
+
+
+@pytest.mark.parametrize("keep", [0, 5, 100, 2000, 20000])
+def test_a_truncated_checkpoint_is_refused(tmp_path, keep):
+    path = tmp_path / "x.safetensors"
+    save_checkpoint(path, LidarNet(101), checkpoint("lidar"))
+    path.write_bytes(path.read_bytes()[:keep])
+    with pytest.raises(StorageError, match="not a whole"):
+        load_checkpoint(path)
+
+
+def test_junk_and_a_folder_are_refused(tmp_path):
+    path = tmp_path / "x.safetensors"
+    path.write_bytes(b"\xff" * 5000)
+    for bad in (path, tmp_path):
+        with pytest.raises(StorageError):
+            load_checkpoint(bad)
+
+
+@pytest.mark.parametrize(
+    "about",
+    [
+        {"kind": "lidar"},
+        {"kind": "walrus"},
+        {"bins": 130},
+        {"filters": 32},
+        {"filters": 10**9},
+        {"bins": 0},
+        {"px": 2},
+        {"seed": "x"},
+    ],
+)
+def test_a_checkpoint_that_is_not_what_it_says_is_refused(tmp_path, about):
+    path = tmp_path / "x.safetensors"
+    fields = {"kind": "fusion", "bins": 101, "filters": 16, "profile": "p", "cruise": None, "provenance": "", "seed": 0}
+    save_file(FusionNet(101, 16).weights(), path, {"lira": json.dumps(fields)})
+    load_checkpoint(path)
+    save_file(FusionNet(101, 16).weights(), path, {"lira": json.dumps(fields | about)})
+    with pytest.raises(StorageError, match="does not hold what it says"):
+        load_checkpoint(path)
+
+
+def test_weights_from_elsewhere_and_weights_that_are_not_finite_are_refused(tmp_path):
+    path = tmp_path / "x.safetensors"
+    save_file(FusionNet(101, 16).weights(), path, {"format": "pt"})
+    with pytest.raises(StorageError, match="no checkpoint of this project"):
+        load_checkpoint(path)
+    network = LidarNet(101)
+    network.out.bias.data[0] = float("nan")
+    save_checkpoint(path, network, checkpoint("lidar"))
+    with pytest.raises(StorageError, match="not finite"):
+        load_checkpoint(path)
+
+
+def test_a_checkpoint_that_cannot_be_written_leaves_the_old_one(tmp_path):
+    path = tmp_path / "x.safetensors"
+    path.mkdir()
+    with pytest.raises(StorageError, match="cannot write"):
+        save_checkpoint(path, LidarNet(101), checkpoint("lidar"))
+    assert [entry.name for entry in tmp_path.iterdir()] == ["x.safetensors"]
+    (tmp_path / "file").touch()
+    with pytest.raises(StorageError, match="cannot write"):
+        save_checkpoint(tmp_path / "file" / "y", LidarNet(101), checkpoint("lidar"))

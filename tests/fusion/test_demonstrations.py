@@ -1,0 +1,284 @@
+import json
+import os
+import signal
+import subprocess
+import sys
+import textwrap
+import time
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from fusion.demonstrations import Demonstration, DemonstrationLog, read_demonstrations
+from hal.errors import StorageError
+from hal.profile import load_profile
+
+SIM = load_profile("thesis-sim")
+REAL = load_profile("rosbot2")
+
+
+def demonstration(k: int = 0, profile=SIM) -> Demonstration:
+    rng = np.random.default_rng(k)
+    shape = profile.features
+    gray = rng.integers(0, 256, (shape.image_px, shape.image_px))
+    return Demonstration(
+        stamp_s=0.2 * k,
+        observation=k,
+        lap=k % 3,
+        source=("human", "camera", "lidar", "mean")[k % 4],
+        action=(0.1 * (k % 10), -1.0),
+        novice=(0.5, 1 / 3),
+        stored=k % 2 == 0,
+        scan=rng.random(shape.bins, dtype=np.float32),
+        image=(gray / 255).astype(np.float32),
+    )
+
+
+def same(one: Demonstration, other: Demonstration) -> bool:
+    arrays = np.array_equal(one.scan, other.scan) and np.array_equal(one.image, other.image)
+    return arrays and replace(one, scan=0, image=0) == replace(other, scan=0, image=0)
+
+
+def write(path: Path, numbers, profile=SIM) -> None:
+    with DemonstrationLog(path, profile) as log:
+        for k in numbers:
+            log.append(demonstration(k, profile))
+
+
+def holds(path: Path, numbers, profile=SIM) -> bool:
+    found = list(read_demonstrations(path))
+    wanted = [demonstration(k, profile) for k in numbers]
+    return len(found) == len(wanted) and all(map(same, found, wanted))
+
+
+def record_bytes(tmp_path: Path) -> int:
+    sizes = []
+    for count in (0, 1):
+        write(tmp_path / f"size{count}", range(count))
+        sizes.append((tmp_path / f"size{count}").stat().st_size)
+    return sizes[1] - sizes[0]
+
+
+@pytest.mark.parametrize("profile", [SIM, REAL])
+def test_what_is_appended_is_read_exactly_also_after_reopening(tmp_path, profile):
+    path = tmp_path / "new" / "labels.demo"
+    write(path, range(5), profile)
+    with DemonstrationLog(path, profile) as log:
+        assert (log.count, log.repaired_bytes) == (5, 0)
+        log.append(demonstration(5, profile))
+        assert holds(path, range(6), profile)  # readable while it is open
+    assert holds(path, range(6), profile)
+
+
+def test_reading_streams(tmp_path):
+    write(tmp_path / "log", range(3))
+    records = read_demonstrations(tmp_path / "log")
+    assert same(next(records), demonstration(0))
+    assert same(next(records), demonstration(1))
+
+
+WRITER = """
+    import sys
+    from pathlib import Path
+    from test_demonstrations import SIM, demonstration
+    from fusion.demonstrations import DemonstrationLog
+    log = DemonstrationLog(Path(sys.argv[1]), SIM)
+    k = log.count
+    while True:
+        log.append(demonstration(k))
+        print(k, flush=True)
+        k += 1
+"""
+
+
+def start(script: str, *arguments: object) -> subprocess.Popen[str]:
+    environment = {**os.environ, "PYTHONPATH": os.pathsep.join([str(Path(__file__).parent), *sys.path])}
+    command = [sys.executable, "-c", textwrap.dedent(script), *map(str, arguments)]
+    return subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, env=environment)
+
+
+def test_labels_survive_kill_9(tmp_path):
+    path = tmp_path / "log"
+    rng = np.random.default_rng(1)
+    for _ in range(4):
+        writer = start(WRITER, path)
+        first = writer.stdout.readline()
+        time.sleep(0.05 * rng.random())
+        os.kill(writer.pid, signal.SIGKILL)
+        said, complaints = writer.communicate()
+        assert first, complaints
+        last = int((first + said).split("\n")[:-1][-1])  # a label it said it had stored
+        count = len(list(read_demonstrations(path)))
+        assert count >= last + 1
+        with DemonstrationLog(path, SIM) as log:
+            assert log.count == count
+    assert count > 10
+    assert holds(path, range(count))
+
+
+def test_a_torn_tail_is_cut_off_and_reported(tmp_path):
+    whole = tmp_path / "whole"
+    write(whole, range(4))
+    data, size = whole.read_bytes(), record_bytes(tmp_path)
+    for cut in (1, 2, size // 2, size - 1):
+        torn = tmp_path / f"torn{cut}"
+        torn.write_bytes(data[:-cut])
+        assert holds(torn, range(3))
+        with DemonstrationLog(torn, SIM) as log:
+            assert (log.count, log.repaired_bytes) == (3, size - cut)
+            log.append(demonstration(3))
+        assert torn.read_bytes() == data
+
+
+def test_a_tail_of_zeros_after_a_power_cut_is_cut_off(tmp_path):
+    path = tmp_path / "log"
+    write(path, range(2))
+    data = path.read_bytes()
+    path.write_bytes(data + bytes(5000))
+    with DemonstrationLog(path, SIM) as log:
+        assert (log.count, log.repaired_bytes) == (2, 5000)
+    assert path.read_bytes() == data
+
+
+def test_a_header_torn_in_the_first_write_is_written_anew(tmp_path):
+    path = tmp_path / "log"
+    write(path, [])
+    header = path.read_bytes()
+    for keep in range(len(header)):
+        path.write_bytes(header[:keep])
+        write(path, range(2))
+        assert holds(path, range(2))
+
+
+def test_damage_before_the_end_is_an_error_that_says_where(tmp_path):
+    path = tmp_path / "log"
+    write(path, range(6))
+    data, size = bytearray(path.read_bytes()), record_bytes(tmp_path)
+    offset = len(data) - 3 * size
+    data[offset + 700] ^= 0x10
+    path.write_bytes(data)
+    with pytest.raises(StorageError, match=f"corrupt at byte {offset}; the 3 records before it are good"):
+        DemonstrationLog(path, SIM)
+    records = read_demonstrations(path)
+    assert all(same(next(records), demonstration(k)) for k in range(3))
+    with pytest.raises(StorageError, match=f"corrupt at byte {offset}"):
+        next(records)
+    assert path.read_bytes() == bytes(data)  # nothing was repaired away
+
+
+def test_every_flipped_bit_is_noticed(tmp_path):
+    path = tmp_path / "log"
+    write(path, range(2))
+    data = path.read_bytes()
+    rng = np.random.default_rng(3)
+    for at in rng.integers(0, len(data), 60):
+        broken = bytearray(data)
+        broken[at] ^= 1 << rng.integers(8)
+        path.write_bytes(broken)
+        try:
+            found = list(read_demonstrations(path))
+        except StorageError:
+            continue
+        assert len(found) == 1  # the last record: like a torn tail
+        assert same(found[0], demonstration(0))
+
+
+def test_a_second_copy_is_refused(tmp_path):
+    path = tmp_path / "log"
+    with DemonstrationLog(path, SIM) as log:
+        log.append(demonstration(0))
+        with pytest.raises(StorageError, match="in use by another process") as refused:
+            DemonstrationLog(path, SIM)
+        assert "another file" in refused.value.remedy
+        writer = start(WRITER, path)
+        assert "in use by another process" in writer.communicate(timeout=60)[1]
+        assert writer.returncode == 1
+        log.append(demonstration(1))
+    assert holds(path, range(2))
+
+
+def test_a_log_of_another_robot_is_refused_and_left_alone(tmp_path):
+    path = tmp_path / "log"
+    write(path, range(2))
+    before = path.read_bytes()
+    with pytest.raises(StorageError, match=r"'thesis-sim' \(101 bins, 32 px\), not for 'rosbot2' \(130 bins, 32 px\)"):
+        DemonstrationLog(path, REAL)
+    assert path.read_bytes() == before
+
+
+@pytest.mark.parametrize("content", [b"hello", b"\0" * 4000, b"LIRADEMO" + b"\xff" * 100])
+def test_a_file_that_is_no_log_is_refused_and_left_alone(tmp_path, content):
+    path = tmp_path / "notes.txt"
+    path.write_bytes(content)
+    with pytest.raises(StorageError):
+        DemonstrationLog(path, SIM)
+    with pytest.raises(StorageError):
+        list(read_demonstrations(path))
+    assert path.read_bytes() == content
+
+
+def test_a_missing_file_and_a_folder_are_storage_errors(tmp_path):
+    with pytest.raises(StorageError, match="cannot read"):
+        list(read_demonstrations(tmp_path / "none"))
+    with pytest.raises(StorageError, match="cannot open"):
+        DemonstrationLog(tmp_path, SIM)
+
+
+def test_features_of_another_size_are_refused(tmp_path):
+    with DemonstrationLog(tmp_path / "log", SIM) as log:
+        with pytest.raises(ValueError, match="does not fit"):
+            log.append(demonstration(0, REAL))
+        log.append(demonstration(0))
+    assert holds(tmp_path / "log", range(1))
+
+
+LIMITED_WRITER = """
+    import json, resource, signal, sys
+    from pathlib import Path
+    from test_demonstrations import SIM, demonstration
+    from fusion.demonstrations import DemonstrationLog
+    from hal.errors import StorageError
+    signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (20_000, resource.RLIM_INFINITY))
+    errors = []
+    with DemonstrationLog(Path(sys.argv[1]), SIM) as log:
+        for k in range(20):
+            try:
+                log.append(demonstration(k))
+            except StorageError as error:
+                errors.append((k, str(error), Path(sys.argv[1]).stat().st_size))
+        resource.setrlimit(resource.RLIMIT_FSIZE, (resource.RLIM_INFINITY, resource.RLIM_INFINITY))
+    print(json.dumps(errors))
+"""
+
+
+def test_a_file_that_cannot_grow_is_reported_keeps_whole_records_and_goes_on_when_it_can(tmp_path):
+    path = tmp_path / "log"
+    writer = start(LIMITED_WRITER, path)
+    said, complaints = writer.communicate(timeout=60)
+    assert writer.returncode == 0, complaints
+    errors = json.loads(said)
+    size = record_bytes(tmp_path)
+    assert [k for k, _, _ in errors] == list(range(errors[0][0], 20))
+    assert 0 < errors[0][0] < 20
+    for number, (_, message, length) in enumerate(errors, start=1):
+        assert f"File too large; {number} labels wait in memory" in message
+        assert length == path.stat().st_size - size * len(errors)  # the partial write was taken back
+    assert holds(path, range(20))
+
+
+def test_a_disk_that_fills_up_is_reported_while_labels_still_fit(tmp_path, monkeypatch):
+    path = tmp_path / "log"
+    with DemonstrationLog(path, SIM) as log:
+        log.append(demonstration(0))
+        disk = os.statvfs(tmp_path)
+        nearly_full = os.statvfs_result((*disk[:4], 300_000 // disk.f_frsize, *disk[5:]))
+        monkeypatch.setattr("os.fstatvfs", lambda _: nearly_full)
+        with pytest.raises(StorageError, match="nearly full: 2.. kB"):
+            log.append(demonstration(1))
+    assert holds(path, range(2))
+    with pytest.raises(StorageError, match="nearly full"):
+        DemonstrationLog(path, SIM)
+    assert holds(path, range(2))

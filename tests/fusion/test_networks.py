@@ -1,0 +1,126 @@
+import numpy as np
+import pytest
+import torch
+
+from fusion.networks import CameraNet, FusionNet, LidarNet
+
+RNG = np.random.default_rng(0)
+SCAN = RNG.random(101, dtype=np.float32)
+IMAGE = RNG.random((32, 32), dtype=np.float32)
+
+
+@pytest.mark.parametrize(
+    ("network", "parameters"),
+    [
+        (CameraNet(16), 8_754),
+        (CameraNet(32), 22_114),
+        (LidarNet(101), 10_818),
+        (LidarNet(130), 12_674),
+        (FusionNet(101, 16), 439_666),
+        (FusionNet(130, 32), 850_018),
+    ],
+)
+def test_parameter_counts_are_those_of_appendix_b(network, parameters):
+    assert sum(parameter.numel() for parameter in network.parameters()) == parameters
+
+
+def leaky(x):
+    return np.where(x > 0, x, 0.3 * x)
+
+
+def test_the_fusion_network_computes_what_appendix_b_says():
+    """Against plain numpy: valid 3x3 convolutions, leaky ReLU 0.3 before the pool, tanh; camera first."""
+    network = FusionNet(101, 4, seed=5)
+    w = {name: value.astype(np.float64) for name, value in network.weights().items()}
+
+    def convolve(x, weight, bias):
+        windows = np.lib.stride_tricks.sliding_window_view(x, (3, 3), axis=(1, 2))
+        return np.einsum("chwij,fcij->fhw", windows, weight) + bias[:, None, None]
+
+    hidden = leaky(convolve(IMAGE[None], w["camera.conv1.weight"], w["camera.conv1.bias"]))
+    hidden = leaky(convolve(hidden, w["camera.conv2.weight"], w["camera.conv2.bias"]))
+    camera = hidden.reshape(4, 14, 2, 14, 2).max(axis=(2, 4)).ravel()
+    lidar = SCAN
+    for layer in ("lidar.fc1", "lidar.fc2"):
+        lidar = leaky(w[f"{layer}.weight"] @ lidar + w[f"{layer}.bias"])
+    fused = np.concatenate([camera, lidar])
+    for layer in ("fc1", "fc2"):
+        fused = leaky(w[f"{layer}.weight"] @ fused + w[f"{layer}.bias"])
+    expected = np.tanh(w["out.weight"] @ fused + w["out.bias"])
+    np.testing.assert_allclose(network.act(SCAN, IMAGE), expected, atol=1e-5)
+
+
+def test_initialisation_is_glorot_with_zero_biases_and_depends_on_the_seed_alone():
+    torch.manual_seed(1)
+    network = FusionNet(101, 16, seed=3)
+    torch.manual_seed(2)
+    same, other = FusionNet(101, 16, seed=3).weights(), FusionNet(101, 16, seed=4).weights()
+    for name, value in network.weights().items():
+        np.testing.assert_array_equal(value, same[name])
+        if name.endswith("bias"):
+            assert not value.any()
+        else:
+            assert not np.array_equal(value, other[name])
+    limit = (6 / (3200 + 128)) ** 0.5
+    fc1 = network.weights()["fc1.weight"]
+    assert 0.99 * limit < np.abs(fc1).max() <= limit
+    assert fc1.std() == pytest.approx(limit / 3**0.5, rel=0.01)
+
+
+@pytest.mark.parametrize("network", [CameraNet(16), LidarNet(101), FusionNet(101, 16)])
+def test_one_step_is_what_a_batch_gives(network):
+    batch = network(torch.from_numpy(np.stack([SCAN, SCAN])), torch.from_numpy(np.stack([IMAGE * 0, IMAGE])))
+    action = network.act(SCAN, IMAGE)
+    np.testing.assert_allclose(action, batch[1].tolist(), atol=1e-6)
+    assert all(isinstance(a, float) and -1 <= a <= 1 for a in action)
+
+
+def test_an_expert_looks_at_its_own_sensor_only():
+    assert CameraNet(16).act(SCAN * 0, IMAGE) == CameraNet(16).act(SCAN, IMAGE)
+    assert LidarNet(101).act(SCAN, IMAGE * 0) == LidarNet(101).act(SCAN, IMAGE)
+
+
+def test_a_novice_can_take_its_experts_trunks():
+    camera, lidar = CameraNet(16, seed=8), LidarNet(101, seed=9)
+    novice = FusionNet.from_experts(camera, lidar, seed=1)
+    scan, image = torch.from_numpy(SCAN)[None], torch.from_numpy(IMAGE)[None]
+    features = novice.features(scan, image)
+    torch.testing.assert_close(features, torch.cat([camera.features(scan, image), lidar.features(scan, image)], dim=1))
+    torch.testing.assert_close(novice.head(features), novice(scan, image))
+    with torch.no_grad():
+        camera.trunk.conv1.weight.zero_()
+    torch.testing.assert_close(novice.features(scan, image), features)
+
+
+def test_weights_go_out_and_in():
+    source, target = FusionNet(101, 16, seed=1), FusionNet(101, 16, seed=2)
+    weights = source.weights()
+    target.load_weights(weights)
+    assert target.act(SCAN, IMAGE) == source.act(SCAN, IMAGE)
+    weights["out.bias"][:] = 9.0
+    assert target.act(SCAN, IMAGE) == source.act(SCAN, IMAGE)
+
+
+def broken(change):
+    weights = FusionNet(101, 16).weights()
+    change(weights)
+    return weights
+
+
+@pytest.mark.parametrize(
+    "weights",
+    [
+        FusionNet(130, 16).weights(),
+        FusionNet(101, 32).weights(),
+        CameraNet(16).weights(),
+        broken(lambda w: w.pop("out.bias")),
+        broken(lambda w: w.update({"out.bias": np.array([0.0, np.nan], np.float32)})),
+        broken(lambda w: w.update({"out.bias": np.zeros(2)})),
+    ],
+)
+def test_weights_that_do_not_fit_change_nothing(weights):
+    network = FusionNet(101, 16, seed=2)
+    before = network.act(SCAN, IMAGE)
+    with pytest.raises(ValueError):
+        network.load_weights(weights)
+    assert network.act(SCAN, IMAGE) == before

@@ -1,0 +1,137 @@
+import os
+import signal
+import time
+
+import numpy as np
+import pytest
+import torch
+from test_learner import labels
+
+from fusion.learner import Learner
+from fusion.networks import LidarNet
+from fusion.trainer import InlineTrainer, ProcessTrainer
+from hal.errors import LiraError
+
+WAIT_S = 60.0  # for what is certain to come; only a hang takes that long
+
+
+@pytest.fixture(autouse=True)
+def _one_thread():
+    threads = torch.get_num_threads()
+    torch.set_num_threads(1)
+    yield
+    torch.set_num_threads(threads)
+
+
+def learner(updates: int = 50) -> Learner:
+    return Learner(LidarNet(101), seed=1, frozen_trunks=False, updates=updates)
+
+
+def process_trainer(**settings):
+    return ProcessTrainer(learner(), **settings)
+
+
+@pytest.fixture(scope="module")
+def real_time():
+    trainer = process_trainer()
+    yield trainer
+    trainer.close()
+
+
+def wait_for_weights(trainer):
+    deadline = time.monotonic() + WAIT_S
+    while time.monotonic() < deadline:
+        if (weights := trainer.poll(time.monotonic())) is not None:
+            return weights
+        time.sleep(0.005)
+    raise AssertionError("no weights")
+
+
+def lockstep(trainer, steps: int = 24) -> dict[int, dict[str, np.ndarray]]:
+    """Decide at 5 Hz of simulated time, train at every eighth step; which step adopted what."""
+    adopted = {}
+    try:
+        for k, label in enumerate(labels(steps)):
+            now_s = 0.2 * k
+            if (weights := trainer.poll(now_s)) is not None:
+                adopted[k] = weights
+            trainer.add(label)
+            if k % 8 == 7:
+                trainer.start(now_s)
+                assert trainer.pending
+    finally:
+        trainer.close()
+    return adopted
+
+
+def test_both_trainers_adopt_the_same_weights_at_the_same_steps():
+    inline = lockstep(InlineTrainer(learner(), adopt_after_s=0.6))
+    process = lockstep(process_trainer(adopt_after_s=0.6))
+    assert list(inline) == list(process) == [10, 18]
+    for k, weights in inline.items():
+        for name, value in weights.items():
+            np.testing.assert_array_equal(process[k][name], value)
+
+
+def test_inline_training_is_ready_at_once():
+    trainer = InlineTrainer(learner())
+    trainer.add(labels(1)[0])
+    assert trainer.poll(0.0) is None
+    trainer.start(5.0)
+    assert trainer.poll(4.9) is None
+    assert trainer.poll(5.0) is not None
+    assert trainer.poll(5.0) is None
+    assert not trainer.pending
+
+
+def test_weights_come_when_ready_while_labels_keep_coming(real_time):
+    assert real_time.poll(0.0) is None
+    for label in labels(40):
+        real_time.add(label)
+    real_time.start(0.0)
+    for label in labels(500, seed=2):  # more than a pipe holds
+        real_time.add(label)
+    assert real_time.pending
+    first = wait_for_weights(real_time)
+    assert not real_time.pending
+    assert real_time.poll(0.0) is None
+    real_time.start(0.0)
+    second = wait_for_weights(real_time)
+    assert not np.array_equal(first["trunk.fc1.weight"], second["trunk.fc1.weight"])
+
+
+def test_the_process_gives_way_and_is_deaf_to_ctrl_c(real_time):
+    assert os.getpriority(os.PRIO_PROCESS, real_time.pid) > os.getpriority(os.PRIO_PROCESS, 0)
+    os.kill(real_time.pid, signal.SIGINT)
+    real_time.add(labels(1)[0])
+    real_time.start(0.0)
+    assert wait_for_weights(real_time)
+    assert signal.SIGINT not in signal.pthread_sigmask(signal.SIG_BLOCK, ())
+
+
+@pytest.mark.parametrize("adopt_after_s", [None, 0.4])
+def test_a_trainer_that_dies_is_reported_at_the_next_poll(adopt_after_s):
+    trainer = process_trainer(adopt_after_s=adopt_after_s)
+    try:
+        made = labels(2)
+        trainer.add(made[0])
+        os.kill(trainer.pid, signal.SIGKILL)
+        trainer._process.join(WAIT_S)
+        trainer.add(made[1])
+        trainer.start(0.0)
+        with pytest.raises(LiraError, match=r"died \(exit code -9\)") as died:
+            trainer.poll(1.0)
+        assert "log" in died.value.remedy
+    finally:
+        trainer.close()
+
+
+def test_closing_in_the_middle_of_a_long_training_step_is_bounded():
+    trainer = ProcessTrainer(learner(updates=10**6))
+    trainer.add(labels(1)[0])
+    trainer.start(0.0)
+    began = time.monotonic()
+    trainer.close()
+    assert time.monotonic() - began < 10.0
+    assert not trainer._process.is_alive()
+    trainer.close()
