@@ -13,6 +13,7 @@ from sim_backend.course import Course
 # The referee looks at least this often, and every centimetre or so where a box may be touched.
 REFEREE_PERIOD_S = 0.2
 TOUCH_PERIOD_S = 0.01
+STILL_M_S = 1e-3
 ROUNDING_S = 1e-9
 
 
@@ -44,7 +45,7 @@ class Body:
         self.odometry = drive.motion(0.0, 0.0, 0.0)
         self.command(STOP)
         self.verdict = Verdict(start_m, start_m, lateral_m, math.inf)
-        self._judge(float(self.course.clearance(self.motion.xy)), touched=False)
+        self._look()
 
     def place(self, state: CourseState) -> None:
         """Continue from a state that a twin told: pose, velocity, progress; nothing has gone wrong yet."""
@@ -53,7 +54,7 @@ class Body:
         self.command(Twist(state.linear_m_s, state.angular_rad_s))
         progress_m = self._progress_m(None if math.isnan(state.progress_m) else state.progress_m)
         self.verdict = Verdict(progress_m, progress_m, 0.0, math.inf)
-        self._judge(float(self.course.clearance(self.motion.xy)), touched=False)
+        self._look()
 
     def command(self, target: Twist) -> None:
         """Set the velocity to drive at from now on."""
@@ -103,10 +104,14 @@ class Body:
         clearance_m = self.verdict.clearance_m
         while (left_s := until_s - self.time_s) > ROUNDING_S:
             speed_m_s = max(abs(float(self.motion.linear_m_s)), abs(self._target.linear_m_s))
-            step_s = left_s
-            if speed_m_s * left_s >= clearance_m:
-                step_s = min(left_s, max(clearance_m / speed_m_s, TOUCH_PERIOD_S))
-            before, after = self.motion, self._step(step_s)
+            target, holds_s = self._obeyed()
+            step_s = min(left_s, holds_s)
+            if speed_m_s * step_s >= clearance_m:
+                step_s = min(step_s, max(clearance_m / max(speed_m_s, STILL_M_S), TOUCH_PERIOD_S))
+            before = self.motion
+            after = drive.step(
+                self._base, before, np.asarray(target.linear_m_s), np.asarray(target.angular_rad_s), step_s
+            )
             ahead_m = float(self.course.clearance(after.xy))
             if ahead_m < 0.0 and ahead_m < clearance_m:
                 # A disc that touches can turn, and back away, but not go on.
@@ -120,13 +125,17 @@ class Body:
             self.time_s += step_s
         self._judge(clearance_m, touched)
 
-    def _step(self, duration_s: float) -> drive.Motion:
-        target = self._target
-        if self._base.drive == "wheels" and self.time_s - self._commanded_s >= drive.FIRMWARE_WATCHDOG_S:
-            target = STOP
-        return drive.step(
-            self._base, self.motion, np.asarray(target.linear_m_s), np.asarray(target.angular_rad_s), duration_s
-        )
+    def _obeyed(self) -> tuple[Twist, float]:
+        """What the base drives at, and for how long: its firmware gives up on a commander that has gone silent."""
+        if self._base.drive != "wheels":
+            return self._target, math.inf
+        holds_s = self._commanded_s + drive.FIRMWARE_WATCHDOG_S - self.time_s
+        return (self._target, holds_s) if holds_s > ROUNDING_S else (STOP, math.inf)
+
+    def _look(self) -> None:
+        """First verdict of an episode. Who is put down into a box has collided."""
+        clearance_m = float(self.course.clearance(self.motion.xy))
+        self._judge(clearance_m, touched=clearance_m < 0.0)
 
     def _progress_m(self, hint_m: float | None) -> float:
         return float(self.course.place(self.motion.xy, self.motion.yaw_rad, hint_m).progress_m)

@@ -22,7 +22,7 @@ OVERSAMPLE_HIGH = 2
 # TinyRenderer takes 60 ms for 640x480: what it draws of a large picture is halved until it has this many pixels.
 TINY_LIMIT_PX = 320 * 240
 JPEG_LIMIT_BYTES = 64_000
-JPEG_QUALITIES = (90, 75, 60, 45, 30, 15)
+JPEG_QUALITIES = (90, 75, 60, 45, 30, 15, 5)
 
 
 class PinholeCamera:

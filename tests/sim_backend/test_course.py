@@ -1,0 +1,101 @@
+import math
+
+import numpy as np
+import pytest
+
+from hal.profile import load_profile
+from sim_backend.course import Course, Obstacles, footprint_radius_m
+from sim_backend.layout import Block, build
+from sim_backend.world import load_world
+
+
+@pytest.fixture(scope="module")
+def eight():
+    return build(load_world("eight")).curve
+
+
+@pytest.mark.parametrize("world", ["line", "line-obstacles", "eight", "race"])
+def test_a_place_put_down_relative_to_the_line_is_found_again(world):
+    curve = build(load_world(world)).curve
+    for progress in np.linspace(0.3, curve.length_m - 0.3, 40):
+        for lateral in (-0.7, 0.0, 0.4):
+            x, y, yaw = curve.pose(progress, lateral)
+            found = curve.project(np.array([x, y]), progress + 0.4)
+            assert found[0] == pytest.approx(progress, abs=0.02)
+            assert found[1] == pytest.approx(lateral, abs=2e-3)
+            assert math.remainder(found[2] - yaw, math.tau) == pytest.approx(0.0, abs=0.01)
+
+
+def test_at_the_crossing_of_the_eight_the_hint_keeps_the_branch(eight):
+    crossing = [eight.pose(s)[:2] for s in (eight.length_m / 2 - 3.874, eight.length_m - 3.874)]
+    assert crossing[0] == pytest.approx(crossing[1], abs=0.02)
+    first = eight.length_m / 2 - 3.874
+    for hint in (first, eight.length_m - 3.874):
+        progress, lateral, _ = eight.project(np.array(crossing[0]), hint)
+        assert progress == pytest.approx(hint, abs=0.05)
+        assert lateral == pytest.approx(0.0, abs=0.01)
+
+
+def test_progress_grows_over_the_laps(eight):
+    hint = 0.0
+    for s in np.arange(0.0, 2.5 * eight.length_m, 0.2):
+        x, y, _ = eight.pose(s, 0.3)
+        hint = float(eight.project(np.array([x, y]), hint)[0])
+        assert hint == pytest.approx(s, abs=0.02)
+
+
+def test_progress_shrinks_when_driving_back_over_the_start(eight):
+    x, y, _ = eight.pose(-0.5)
+    assert float(eight.project(np.array([x, y]), 0.0)[0]) == pytest.approx(-0.5, abs=0.02)
+
+
+def test_left_is_positive(eight):
+    assert float(eight.project(np.array([0.0, 0.2]), 0.0)[1]) == pytest.approx(0.2, abs=1e-3)
+    assert float(eight.project(np.array([0.0, -0.2]), 0.0)[1]) == pytest.approx(-0.2, abs=1e-3)
+
+
+def test_an_open_line_goes_on_straight_beyond_its_ends():
+    curve = build(load_world("race")).curve
+    progress, lateral, heading = curve.project(np.array([[-3.0, 1.0], [130.0, -2.0]]))
+    assert progress == pytest.approx([-3.0, 130.0])
+    assert lateral == pytest.approx([1.0, -2.0])
+    assert heading == pytest.approx([0.0, 0.0])
+
+
+def test_many_poses_at_once_are_as_one_by_one(eight):
+    rng = np.random.default_rng(0)
+    s = rng.uniform(0.0, eight.length_m, 50)
+    xy = np.array([eight.pose(at, off)[:2] for at, off in zip(s, rng.uniform(-1, 1, 50), strict=True)])
+    together = eight.project(xy, s)
+    for index in range(50):
+        alone = eight.project(xy[index], s[index])
+        assert [float(v) for v in alone] == [float(v[index]) for v in together]
+
+
+def test_distance_to_a_turned_box():
+    block = Block(1.0, 2.0, math.pi / 4, 2.0, 1.0, 0.5, 0)
+    obstacles = Obstacles.of((block,))
+    ahead = np.array([math.cos(math.pi / 4), math.sin(math.pi / 4)])
+    left = np.array([-ahead[1], ahead[0]])
+    centre = np.array([1.0, 2.0])
+    points = np.array([centre + 3 * ahead, centre + 2 * left, centre + 4 * ahead + 4.5 * left, centre])
+    assert obstacles.distance(points) == pytest.approx([2.0, 1.5, 5.0, -0.5])
+
+
+def test_without_boxes_the_clearance_is_infinite():
+    course = Course(build(load_world("eight")), 0.15)
+    assert course.clearance(np.zeros((3, 2))).tolist() == [math.inf] * 3
+
+
+def test_the_disc_covers_the_footprint():
+    base = load_profile("thesis-sim").base
+    assert footprint_radius_m(base) == pytest.approx(math.hypot(0.100, 0.1175))
+
+
+def test_the_end_of_an_open_and_of_a_closed_course():
+    race, eight = (Course(build(load_world(name)), 0.15) for name in ("race", "eight"))
+    assert not race.finished(119.9, 0.0)
+    assert race.finished(120.0, 100.0)
+    length = eight.layout.curve.length_m
+    assert not eight.finished(length, 1.0)
+    assert eight.finished(length + 1.0, 1.0)

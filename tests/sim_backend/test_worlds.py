@@ -1,0 +1,165 @@
+import math
+
+import numpy as np
+import pytest
+
+from hal.errors import ConfigError
+from sim_backend.layout import build, distance_m
+from sim_backend.world import known_worlds, load_world
+
+OVAL = """
+description = "an oval"
+[line]
+closed = true
+pieces = [
+  { straight_m = 4.0 }, { radius_m = 2.0, angle_deg = 180 },
+  { straight_m = 4.0 }, { radius_m = 2.0, angle_deg = 180 },
+]
+[limits]
+lost_m = 1.0
+"""
+FIELD = """
+description = "a field"
+[[box]]
+x_m = 3.0
+y_m = 0.0
+[limits]
+lost_m = 5.0
+finish_m = 10.0
+"""
+
+
+def write(folder, text):
+    path = folder / "mine.toml"
+    path.write_text(text, encoding="utf-8")
+    return str(path)
+
+
+@pytest.mark.parametrize("name", known_worlds())
+def test_every_world_that_comes_with_the_project_loads_and_builds(name):
+    world = load_world(name)
+    assert world.name == name
+    for seed in range(5):
+        layout = build(world, seed)
+        assert layout == layout
+        assert len(layout.blocks) == len(build(world, seed + 1).blocks)
+
+
+def test_the_worlds_of_the_thesis_are_there():
+    assert {"line", "forest", "line-obstacles", "race", "eight"} <= set(known_worlds())
+
+
+def test_a_users_world_is_loaded_by_its_path(tmp_path):
+    world = load_world(write(tmp_path, OVAL))
+    assert world.name == "mine"
+    assert build(world).curve.length_m == pytest.approx(8.0 + 4.0 * math.pi, abs=1e-3)
+
+
+def test_an_unknown_world_names_the_known_ones():
+    with pytest.raises(ConfigError, match="unknown world 'nosuch'.*eight.*race"):
+        load_world("nosuch")
+
+
+def test_a_missing_file_is_named():
+    with pytest.raises(ConfigError, match="cannot read nowhere/mine.toml"):
+        load_world("nowhere/mine.toml")
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "complaint"),
+    [
+        ("lost_m = 1.0", "lost_m = 1.0\nlots_m = 2.0", "unknown key `lots_m`.*limits"),
+        ("closed = true", "closed = true\nwidth_m = -0.1", "line.width_m"),
+        ("closed = true", "closed = true\ngray = 256", "line.gray"),
+        ("angle_deg = 180 },\n]", "angle_deg = 170 },\n]", "ends .* m and 10.0 degrees off"),
+        ("{ straight_m = 4.0 }, {", "{ straight_m = 4.0, radius_m = 1.0 }, {", "either straight_m"),
+        ("{ straight_m = 4.0 }, {", "{ radius_m = 1.0 }, {", "either straight_m"),
+        ("{ straight_m = 4.0 }, {", "{ }, {", "either straight_m"),
+        ("lost_m = 1.0", "lost_m = 1.0\nfinish_m = 5.0", "finish_m is for an open line"),
+        ("closed = true\n", "", "finish_m is needed"),
+        ("[limits]", "[[along]]\ncount = 9\n[limits]", "do not fit on"),
+        ("[limits]", "[[along]]\ncount = 2\nbeside_m = [1.0, 0.5]\n[limits]", "nearest, farthest"),
+        ("[limits]", "[[box]]\nx_m = 0.3\ny_m = 0.0\n[limits]", "box 1 at .* stands on the start"),
+        ("lost_m = 1.0", "lost_m = nan", "lost_m"),
+        ("[line]", "[line", "not valid TOML"),
+    ],
+)
+def test_a_mistake_in_a_world_file_is_named(tmp_path, old, new, complaint):
+    assert old in OVAL
+    with pytest.raises(ConfigError, match=complaint) as caught:
+        load_world(write(tmp_path, OVAL.replace(old, new)))
+    assert "mine.toml" in caught.value.what or caught.value.remedy
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "complaint"),
+    [
+        ("[limits]", "[[along]]\ncount = 2\n[limits]", "has no `line`"),
+        ("[limits]", "[[area]]\ncount = 2\nx_m = [5.0, 1.0]\ny_m = [0.0, 1.0]\n[limits]", "from < to"),
+        ("[limits]", "[[area]]\ncount = 50\nx_m = [5.0, 6.0]\ny_m = [0.0, 1.0]\n[limits]", "do not fit into the area"),
+    ],
+)
+def test_a_mistake_in_a_world_without_a_line_is_named(tmp_path, old, new, complaint):
+    with pytest.raises(ConfigError, match=complaint):
+        load_world(write(tmp_path, FIELD.replace(old, new)))
+
+
+def test_a_layout_comes_back_from_its_seed_and_differs_between_seeds():
+    world = load_world("race")
+    assert build(world, 3).blocks == build(world, 3).blocks
+    assert build(world, 3).blocks != build(world, 4).blocks
+
+
+def test_a_negative_layout_is_refused():
+    with pytest.raises(ConfigError, match="layout -1 is negative"):
+        build(load_world("race"), -1)
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_the_race_has_21_boxes_on_and_beside_its_line(seed):
+    blocks = build(load_world("race"), seed).blocks
+    assert len(blocks) == 21
+    x, y = (np.array([getattr(b, key) for b in blocks]) for key in ("x_m", "y_m"))
+    assert (np.diff(np.sort(x)) >= 4.0 - 1e-9).all()
+    assert x.min() > 4.0
+    assert x.max() < 120.0
+    assert (np.abs(y) <= 0.15).sum() == 13
+    assert ((np.abs(y) >= 0.5) & (np.abs(y) <= 1.0)).sum() == 8
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_the_obstacles_stand_on_the_line_well_apart(seed):
+    layout = build(load_world("line-obstacles"), seed)
+    xy = np.array([(b.x_m, b.y_m) for b in layout.blocks])
+    progress, lateral, _ = layout.curve.project(xy)
+    assert 40.0 < layout.curve.length_m < 60.0
+    assert 6 <= len(xy) <= 10
+    assert (np.abs(lateral) <= 0.1 + 1e-3).all()
+    gaps = np.diff(np.sort(progress), append=np.sort(progress)[0] + layout.curve.length_m)
+    assert (gaps >= 4.0 - 0.05).all()
+
+
+def test_the_forest_grows_denser_and_leaves_gaps_and_the_start_free():
+    counts = np.zeros(2)
+    for seed in range(4):
+        blocks = build(load_world("forest"), seed).blocks
+        x = np.array([b.x_m for b in blocks[1:]])
+        counts += [(x < 23.0).sum(), (x >= 23.0).sum()]
+        assert min(distance_m(block, 0.0, 0.0) for block in blocks) > 1.9
+        for index, block in enumerate(blocks):
+            for other in blocks[:index]:
+                assert math.hypot(block.x_m - other.x_m, block.y_m - other.y_m) > 0.45 + 0.7
+    assert counts[1] > 1.5 * counts[0]
+
+
+def test_lines_can_be_followed_at_one_metre_and_one_radian_a_second():
+    for name in ("line", "line-obstacles", "eight"):
+        curve = build(load_world(name)).curve
+        curvature = np.abs(np.diff(curve.headings)) / curve.step_m
+        assert curvature.max() < 0.55, name
+
+
+def test_the_line_bends_both_ways():
+    turn = np.diff(build(load_world("line")).curve.headings)
+    assert turn.min() < -0.02
+    assert turn.max() > 0.02
