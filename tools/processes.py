@@ -116,11 +116,15 @@ class ChildProcess:
         how = f"signal {signal.Signals(-status).name}" if status is not None and status < 0 else f"status {status}"
         return ProcessError(f"{self.name} ended with {how}; it wrote:\n{self.tail()}", f"All of it: {self.log}")
 
+    def signal(self, number: signal.Signals) -> None:
+        """Send it a signal; nothing happens if it has ended."""
+        self._process.send_signal(number)
+
     def stop(self) -> int:
         """End it: asked twice, then killed; every step is bounded. Returns its exit status. May be called twice."""
         for number, patience_s in STOP_SIGNALS:
             if self.status() is None:
-                self._process.send_signal(number)
+                self.signal(number)
             status = self.wait(patience_s)
             if status is not None:
                 return status

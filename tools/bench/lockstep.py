@@ -34,7 +34,7 @@ def measure() -> float:
     with TemporaryDirectory() as folder:
         record = Path(folder) / "run.jsonl"
         port = free_port()
-        name, endpoint = f"bench-{port}", f"tcp/127.0.0.1:{port}"
+        name, endpoint = f"bench_{port}", f"127.0.0.1:{port}"
         twin = lira_command("twin", "--name", name, "--world", WORLD, "--listen", endpoint, "--lockstep")
         words = ["--name", name, "--connect", endpoint, "--method", "lira", "--teacher", "scripted"]
         learner = lira_command("fusion", *words, "--train-laps", "1", "--unseen", "0", "--run", folder)

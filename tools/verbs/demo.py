@@ -48,7 +48,7 @@ def run(args: argparse.Namespace) -> int:
     load_world(args.world)
     folder: Path = args.run or Path("runs") / f"demo-{datetime.now():%Y%m%d-%H%M%S}"
     port = free_port()
-    name, endpoint = f"demo-{port}", f"tcp/127.0.0.1:{port}"
+    name, endpoint = f"demo_{port}", f"127.0.0.1:{port}"
     both = ["--name", name, "--layout", str(args.layout), "--seed", str(args.seed)]
     twin = ["--world", args.world, "--profile", args.profile, "--listen", endpoint, "--lockstep"]
     fusion = ["--connect", endpoint, "--method", "lira", "--teacher", "scripted", "--run", str(folder)]

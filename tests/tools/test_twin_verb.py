@@ -1,0 +1,77 @@
+import signal
+import subprocess
+import sys
+
+import pytest
+
+from tools.processes import ChildProcess, free_port, lira_command
+
+
+def lira(*words, block=()):
+    """Run `lira` in a process of its own; importing a package in `block` fails as if it were not installed."""
+    code = f"import sys; sys.modules.update(dict.fromkeys({list(block)!r}))\n"
+    code += f"from tools.cli import main; sys.exit(main({list(words)!r}))"
+    return subprocess.run([sys.executable, "-c", code], check=False, capture_output=True, text=True, timeout=60)
+
+
+def test_an_unknown_world_names_the_known_ones_before_anything_heavy_is_loaded():
+    done = lira("twin", "--world", "nosuch", block=["pybullet", "zenoh", "torch", "cv2", "rosbags"])
+    assert done.returncode == 2
+    what, remedy = done.stderr.splitlines()
+    assert what == "lira twin: unknown world 'nosuch'"
+    assert "line-obstacles" in remedy
+    assert "race" in remedy
+
+
+def test_an_unknown_profile_names_the_known_ones():
+    done = lira("twin", "--profile", "nosuch")
+    assert done.returncode == 2
+    assert "rosbot2, thesis-sim" in done.stderr
+
+
+def test_a_world_file_with_a_typo_names_file_and_key(tmp_path):
+    path = tmp_path / "mine.toml"
+    path.write_text('description = "x"\n[limits]\nlost_m = 1.0\nfinish_m = 5.0\nfinnish_m = 1.0\n')
+    done = lira("twin", "--world", str(path))
+    assert done.returncode == 2
+    assert str(path) in done.stderr
+    assert "finnish_m" in done.stderr
+    assert "Traceback" not in done.stderr
+
+
+def test_without_pybullet_it_says_what_to_install():
+    done = lira("twin", block=["pybullet"])
+    assert done.returncode == 2
+    assert done.stderr.splitlines() == [
+        "lira twin: pybullet is not installed",
+        "  Install it with: pip install 'lira-rosbot[sim]'",
+    ]
+
+
+@pytest.mark.parametrize("words", [["--lockstep"], ["--speed", "2"]])
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_it_says_when_it_is_ready_and_stops_cleanly_when_told(tmp_path, words, number):
+    port = free_port()
+    command = lira_command("twin", "--name", f"verb_{port}", "--listen", f"127.0.0.1:{port}", *words)
+    with ChildProcess("the twin", command, tmp_path / "log") as twin:
+        line = twin.wait_ready("serves world", 60.0)
+        pace = "lockstep" if "--lockstep" in words else "2 times real time"
+        where = f"world 'line' (thesis-sim) on 127.0.0.1:{port}"
+        assert line == f"twin 'verb_{port}' serves {where}, {pace}; stop with Ctrl-C"
+        twin.signal(number)
+        assert twin.wait(20.0) == 0
+    assert "Traceback" not in twin.output()
+
+
+def test_a_port_in_use_and_a_name_in_use_are_refused(tmp_path):
+    port, other = free_port(), free_port()
+    name = f"verb_{port}"
+    command = lira_command("twin", "--name", name, "--listen", f"127.0.0.1:{port}")
+    with ChildProcess("the twin", command, tmp_path / "log") as twin:
+        twin.wait_ready("serves world", 60.0)
+        same_port = lira("twin", "--name", "another", "--listen", f"127.0.0.1:{port}")
+        assert same_port.returncode == 2
+        assert f"127.0.0.1:{port} is already in use" in same_port.stderr
+        same_name = lira("twin", "--name", name, "--listen", f"127.0.0.1:{other}")
+        assert same_name.returncode == 2
+        assert f"a robot named '{name}' already" in same_name.stderr

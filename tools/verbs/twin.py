@@ -1,0 +1,112 @@
+"""Run the digital twin: a simulated ROSbot on the bus, driven exactly like the real one.
+
+It publishes the sensors and obeys velocity commands below its name (rosbot/scan, rosbot/cmd_vel, ...). Start a driver
+in another shell, for example `lira fusion --policy camera-expert`. Without one the robot stands.
+
+examples:
+  lira twin                                   the line world in real time, for anyone on this machine
+  lira twin --world race --layout 7           another world, another layout of its boxes
+  lira twin --world my-track.toml             a world of your own: copy one of sim_backend/worlds
+  lira twin --profile rosbot2 --speed 1.5     the ROSbot 2.0's sensors and wheels, 1.5 times real time
+  lira twin --lockstep                        time stands until the driver has answered: fast and repeatable
+"""
+
+import argparse
+import threading
+import time
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from hal.bus import Bus
+    from sim_backend.twin import Twin
+
+LOOK_S = 0.2
+STATUS_S = 10.0
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the arguments."""
+    add = parser.add_argument
+    add("--world", default="line", help="world by name or .toml file (default: %(default)s)")
+    add("--profile", default="thesis-sim", help="robot by name or .toml file (default: %(default)s)")
+    add("--name", default="rosbot", help="robot's name: every key on the bus begins with it (default: %(default)s)")
+    add(
+        "--listen",
+        default="127.0.0.1:7447",
+        metavar="HOST:PORT",
+        help="where drivers connect; 0.0.0.0:7447 lets other machines in (default: %(default)s, this machine only)",
+    )
+    add("--layout", type=int, default=0, help="which random layout of the world's boxes (default: %(default)s)")
+    add("--seed", type=int, default=0, help="seeds the sensors' noise (default: %(default)s)")
+    pace = parser.add_mutually_exclusive_group()
+    pace.add_argument("--speed", type=float, default=1.0, metavar="X", help="times real time (default: %(default)g)")
+    pace.add_argument("--lockstep", action="store_true", help="time passes only when the driver has answered")
+    add(
+        "--renderer",
+        choices=("auto", "tiny", "egl"),
+        default="auto",
+        help="what draws the camera's picture: tiny runs anywhere, egl needs OpenGL (default: %(default)s)",
+    )
+
+
+def run(args: argparse.Namespace) -> int:
+    """Serve until told to stop."""
+    from hal.profile import load_profile
+    from sim_backend.world import load_world
+
+    # What is wrong with the words is said at once, before anything heavy is loaded.
+    profile, world = load_profile(args.profile), load_world(args.world)
+
+    import msgspec
+
+    from hal.bus import Bus
+    from hal.governed import GovernedRobot
+    from hal.server import HalServer, stop_on_signal
+    from sim_backend.twin import Twin
+
+    factor = None if args.lockstep else args.speed
+    twin = Twin(profile, world, layout=args.layout, seed=args.seed, realtime_factor=factor, renderer=args.renderer)
+    pace = "lockstep" if args.lockstep else "real time" if factor == 1.0 else f"{factor:g} times real time"
+    bus = Bus(args.name, listen=args.listen)
+    try:
+        with stop_on_signal() as stop:
+
+            def ready() -> None:
+                where = f"world '{world.name}' ({profile.name}) on {args.listen}"
+                print(f"twin '{args.name}' serves {where}, {pace}; stop with Ctrl-C", flush=True)
+                if not args.lockstep:  # there the driver tells how it goes
+                    threading.Thread(target=report, args=(twin, bus, stop), daemon=True, name="status").start()
+
+            HalServer(
+                GovernedRobot(twin),
+                bus,
+                twin,
+                arena_info=msgspec.json.encode(world),
+                lockstep=args.lockstep,
+                ready=ready,
+            ).run(stop)
+    finally:
+        bus.close()
+    return 0
+
+
+def report(twin: "Twin", bus: "Bus", stop: threading.Event) -> None:
+    """Say now and then who drives, how fast, and what was hit; nothing while nothing changes."""
+    from hal.topics import APPLIED
+
+    applied, said, hit, collisions = bus.reader(APPLIED), "", False, 0
+    next_s = time.monotonic()
+    while not stop.wait(LOOK_S):
+        state = twin.state()
+        collisions += state.collided and not hit
+        hit = state.collided
+        if time.monotonic() < next_s:
+            continue
+        newest = applied.newest()
+        driver = newest.message.source if newest is not None else "none"
+        words = f"{'nobody' if driver == 'none' else driver} drives"
+        words += f", {state.linear_m_s:.1f} m/s, collisions {collisions}"
+        if words != said:
+            print(words, flush=True)
+            next_s = time.monotonic() + STATUS_S
+        said = words
