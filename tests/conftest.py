@@ -5,7 +5,11 @@ from collections.abc import Generator
 
 import pytest
 
-EXPECTED_SKIPS: frozenset[str] = frozenset()
+# Contract tests that have no meaning for one of the adapters.
+EXPECTED_SKIPS = {
+    "over the bus in real time the answer is a step behind",
+    "in lockstep silence stops time",
+}
 
 
 def fail_if_unexpected(report: pytest.TestReport | pytest.CollectReport) -> None:

@@ -32,10 +32,7 @@ def test_an_unexpected_skip_fails_in_ci_and_only_there(tmp_path, how):
 
 
 def test_an_expected_skip_and_an_expected_failure_pass_in_ci(tmp_path):
-    text = CONFTEST.read_text()
-    allowed = text.replace("EXPECTED_SKIPS: frozenset[str] = frozenset()", "EXPECTED_SKIPS = {'no robot here'}")
-    assert allowed != text
-    (tmp_path / "conftest.py").write_text(allowed)
+    (tmp_path / "conftest.py").write_text(CONFTEST.read_text() + "\n\nEXPECTED_SKIPS = {'no robot here'}\n")
     xfail = "@pytest.mark.xfail(reason='known')\ndef test_other(): assert False\n"
     (tmp_path / "test_it.py").write_text(TESTS["a test that skips"] + xfail)
     done = run_pytest(tmp_path, ci=True)
