@@ -163,12 +163,17 @@ def strips(run: Run) -> str:
     rows = [f"<span>{escape(lap.title)}</span>{plots.strip(lap, run.experts, longest_s)}" for lap in laps]
     ticks = "".join(
         f'<span style="left:{100 * seconds / longest_s:.1f}%">{clock(seconds)}</span>'
-        for seconds in range(0, int(longest_s) + 1, plots.nice_step(longest_s))
+        for seconds in range(0, int(longest_s) + 1, time_step(longest_s))
     )
     colours = legend(run, [("attention call", "var(--muted)"), ("feedback call", "var(--ink)")])
     note = "The thin bar under each strip shows when the robot called: for attention, or for feedback."
     axis = f'<span></span><div class="axis">{ticks}</div>'
     return section("Who drove when", note, f'{colours}<div class="strips">{"".join(rows)}{axis}</div>')
+
+
+def time_step(longest_s: float) -> int:
+    """Distance of the marks on the time axis: at most six of them, at times that people count in."""
+    return next((step for step in (1, 2, 5, 10, 15, 30, 60, 120, 300) if longest_s / step <= 6), 600)
 
 
 def densities(run: Run) -> str:
@@ -177,7 +182,7 @@ def densities(run: Run) -> str:
     colours = "".join(
         [
             key(f"human ({len(labels['human'])} labels)", "var(--human)"),
-            key(f"experts ({len(labels['expert'])} labels)", "var(--e1)"),
+            key(f"experts ({len(labels['expert'])} labels)", "var(--e3)"),
         ]
     )
     linear = plots.density(labels, 0, "Linear velocity", ("-1: full speed back", "1: full speed ahead"))
