@@ -17,8 +17,8 @@ NEAR_M = 0.02
 FAR_M = 60.0
 # Up to this many pixels TinyRenderer wins, and its picture is worth rendering larger.
 SMALL_PX = 160 * 120
-OVERSAMPLE_WIDE = 3
-OVERSAMPLE_HIGH = 2
+OVERSAMPLE_WIDE = 8
+OVERSAMPLE_HIGH = 3
 # TinyRenderer takes 60 ms for 640x480: what it draws of a large picture is halved until it has this many pixels.
 TINY_LIMIT_PX = 320 * 240
 JPEG_LIMIT_BYTES = 64_000
@@ -28,12 +28,14 @@ JPEG_QUALITIES = (90, 75, 60, 45, 30, 15, 5)
 class PinholeCamera:
     """Renders what a camera on the robot sees in a scene, with OpenGL if the scene has it."""
 
-    def __init__(self, camera: Camera, scene: Scene, sky_gray: int) -> None:
+    def __init__(self, camera: Camera, scene: Scene) -> None:
         self._camera = camera
         self.scene = scene
-        self._sky_gray = sky_gray
         self._width_px, self._height_px, self._average = render_size(camera, egl=scene.egl)
-        self._projection = projection_matrix(camera)
+        self._background = background(camera, self._width_px, self._height_px, scene)
+        # TinyRenderer samples each pixel at its corner instead of its middle, OpenGL does not.
+        shift = (0.0, 0.0) if scene.egl else (1 / self._width_px, 1 / self._height_px)
+        self._projection = projection_matrix(camera, shift)
         bullet = scene.bullet
         self._how = {
             "shadow": 0,
@@ -52,9 +54,7 @@ class PinholeCamera:
         _, _, pixels, depth, _ = self.scene.bullet.getCameraImage(
             self._width_px, self._height_px, view, self._projection, **self._how
         )
-        picture: ByteArray = np.array(pixels[..., 0])
-        # Where nothing was drawn is sky, and each renderer has a shade of its own there.
-        picture[depth >= 1.0] = self._sky_gray
+        picture: ByteArray = np.where(depth < 1.0, pixels[..., 0], self._background)
         if self._average:
             size = (self._camera.width_px, self._camera.height_px)
             picture = np.asarray(cv2.resize(picture, size, interpolation=cv2.INTER_AREA), dtype=np.uint8)
@@ -71,14 +71,29 @@ def render_size(camera: Camera, *, egl: bool) -> tuple[int, int, bool]:
     return width, height, False
 
 
-def projection_matrix(camera: Camera) -> list[float]:
-    """OpenGL projection, column by column. The two angles may belong to pixels that are not square."""
+def background(camera: Camera, width_px: int, height_px: int, scene: Scene) -> ByteArray:
+    """What is seen where nothing was drawn, uint8 [height, width]: sky, and floor below the horizon.
+
+    The floor is flat and has no end, and the camera does not roll, so this is exact; drawing it would take
+    TinyRenderer longer than everything that stands on it.
+    """
+    up = 1.0 - (2.0 * np.arange(height_px) + 1.0) / height_px
+    sky = up * math.tan(camera.vfov_rad / 2) > math.tan(camera.pitch_rad)
+    column = np.where(sky, scene.sky_gray, scene.ground_gray).astype(np.uint8)
+    return np.repeat(column[:, None], width_px, axis=1)
+
+
+def projection_matrix(camera: Camera, shift: tuple[float, float] = (0.0, 0.0)) -> list[float]:
+    """OpenGL projection, column by column. The two angles may belong to pixels that are not square.
+
+    `shift` moves the picture, in halves of its width and height.
+    """
     wide, high = math.tan(camera.hfov_rad / 2), math.tan(camera.vfov_rad / 2)
     depth = FAR_M - NEAR_M
     return [
         *(1 / wide, 0.0, 0.0, 0.0),
         *(0.0, 1 / high, 0.0, 0.0),
-        *(0.0, 0.0, -(FAR_M + NEAR_M) / depth, -1.0),
+        *(*shift, -(FAR_M + NEAR_M) / depth, -1.0),
         *(0.0, 0.0, -2 * FAR_M * NEAR_M / depth, 0.0),
     ]
 

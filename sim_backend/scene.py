@@ -23,9 +23,6 @@ from sim_backend.layout import Block, Layout
 from sim_backend.polyline import Floats, Polyline
 from sim_backend.world import Line
 
-FLOOR_M = 200.0
-# High enough over the floor not to flicker into it far away, too low to matter to the camera.
-PAINT_HEIGHT_M = 0.003
 PAINT_STEP_M = 0.3
 
 # Boxes go into as few bodies as pybullet allows: TinyRenderer's time goes by bodies more than by triangles.
@@ -67,7 +64,7 @@ def quiet() -> Iterator[None]:
 
 
 class Scene:
-    """A floor with a line and boxes in a pybullet client of its own. Not thread-safe.
+    """A line and boxes in a pybullet client of its own; the floor is the camera's business. Not thread-safe.
 
     With `egl` it tries to load the OpenGL renderer; `self.egl` says whether that worked.
     """
@@ -75,6 +72,7 @@ class Scene:
     def __init__(self, layout: Layout, *, egl: bool = False) -> None:
         self.bullet = import_pybullet()
         self.client: int = self.bullet.connect(self.bullet.DIRECT)
+        self.sky_gray, self.ground_gray = layout.world.sky_gray, layout.world.ground_gray
         # Before the first shape: the plugin learns of shapes as they are made.
         self.egl = egl and self._load_egl()
         self.arrange(layout)
@@ -85,7 +83,6 @@ class Scene:
         bullet.resetSimulation(physicsClientId=self.client)
         # Or pybullet keeps every mesh file it has ever read.
         bullet.setPhysicsEngineParameter(enableFileCaching=0, physicsClientId=self.client)
-        self._draw(floor_mesh(), world.ground_gray)
         if world.line is not None:
             self._draw(ribbon_mesh(layout.curve, world.line), world.line.gray)
         for gray in sorted({block.gray for block in layout.blocks}):
@@ -140,19 +137,6 @@ class Scene:
             self.bullet.createMultiBody(0, solid, visual, physicsClientId=self.client)
 
 
-def floor_mesh() -> Mesh:
-    """One square, facing up."""
-    far = FLOOR_M
-    return np.array([[-far, -far, 0], [far, -far, 0], [far, far, 0], [-far, far, 0]], dtype=np.float64), [
-        0,
-        1,
-        2,
-        0,
-        2,
-        3,
-    ]
-
-
 def ribbon_mesh(curve: Polyline, line: Line) -> Mesh:
     """Two triangles for each stretch of the line, facing up."""
     count = max(round(curve.length_m / PAINT_STEP_M), 1)
@@ -160,7 +144,7 @@ def ribbon_mesh(curve: Polyline, line: Line) -> Mesh:
     for at_m in np.linspace(0.0, curve.length_m, count + 1):
         for side in (-0.5, 0.5):
             x, y, _ = curve.pose(float(at_m), side * line.width_m)
-            edges.append((x, y, PAINT_HEIGHT_M))
+            edges.append((x, y, 0.0))
     indices = [corner for k in range(0, 2 * count, 2) for corner in (k, k + 2, k + 1, k + 1, k + 2, k + 3)]
     return np.array(edges), indices
 

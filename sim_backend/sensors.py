@@ -71,7 +71,7 @@ class Sensors:
 def open_camera(camera: Camera, layout: Layout, renderer: Renderer) -> PinholeCamera:
     """Build the scene with the renderer asked for; "auto" tries both for a large picture and keeps the faster one."""
     if renderer == "tiny" or (renderer == "auto" and camera.width_px * camera.height_px <= SMALL_PX):
-        return PinholeCamera(camera, Scene(layout), layout.world.sky_gray)
+        return PinholeCamera(camera, Scene(layout))
     scene = Scene(layout, egl=True)
     if renderer == "egl" and not scene.egl:
         scene.close()
@@ -79,10 +79,10 @@ def open_camera(camera: Camera, layout: Layout, renderer: Renderer) -> PinholeCa
             "pybullet cannot draw with EGL on this machine",
             "Install an EGL driver (Debian: libegl1 and libgl1-mesa-dri), or use the renderer 'tiny'.",
         )
-    chosen = PinholeCamera(camera, scene, layout.world.sky_gray)
+    chosen = PinholeCamera(camera, scene)
     chosen_s = frame_time_s(chosen)
     if renderer == "auto" and scene.egl:
-        other = PinholeCamera(camera, Scene(layout), layout.world.sky_gray)
+        other = PinholeCamera(camera, Scene(layout))
         if frame_time_s(other) < chosen_s:
             chosen, other = other, chosen
         other.scene.close()

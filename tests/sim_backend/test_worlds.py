@@ -56,12 +56,12 @@ def test_a_users_world_is_loaded_by_its_path(tmp_path):
 
 
 def test_an_unknown_world_names_the_known_ones():
-    with pytest.raises(ConfigError, match="unknown world 'nosuch'.*eight.*race"):
+    with pytest.raises(ConfigError, match=r"unknown world 'nosuch'.*eight.*race"):
         load_world("nosuch")
 
 
 def test_a_missing_file_is_named():
-    with pytest.raises(ConfigError, match="cannot read nowhere/mine.toml"):
+    with pytest.raises(ConfigError, match=r"cannot read nowhere/mine\.toml"):
         load_world("nowhere/mine.toml")
 
 
