@@ -18,8 +18,12 @@ import sys
 import time
 from datetime import datetime
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from hal.errors import ConfigError
+
+if TYPE_CHECKING:
+    from tools.processes import ChildProcess
 
 READY_S = 60.0
 POLL_S = 0.1
@@ -76,39 +80,43 @@ def supervise(twin_command: list[str], fusion_command: list[str], folder: Path) 
 
 
 def watch(twin_command: list[str], fusion_command: list[str], folder: Path) -> None:
-    """Start the twin, then the learner; show progress until the learner has ended by itself."""
-    from tools.processes import ChildProcess, ProcessError
+    """Start the twin, then the learner; return when the learner has ended by itself. Stops the learner first."""
+    from tools.processes import ChildProcess
+
+    with ChildProcess("the twin", twin_command, folder / "twin.log") as twin:
+        print(twin.wait_ready("serves world", READY_S), flush=True)
+        with ChildProcess("the learner", fusion_command, folder / "fusion.log") as learner:
+            follow(twin, learner, folder)
+
+
+def follow(twin: "ChildProcess", learner: "ChildProcess", folder: Path) -> None:
+    """Show how the run gets on until the learner ends. Raises `ProcessError` if either dies, or nothing happens."""
+    from tools.processes import ProcessError
     from tools.progress import Display, Progress, Tail
     from tools.report import RECORD
 
     display, progress, tail = Display(sys.stdout), Progress(), Tail(folder / RECORD)
-    # The learner is left first, so it is stopped first: the twin sees it off.
-    with (
-        ChildProcess("the twin", twin_command, folder / "twin.log") as twin,
-        ChildProcess("the learner", fusion_command, folder / "fusion.log") as fusion,
-    ):
-        try:
-            display.keep(twin.wait_ready("serves world", READY_S))
-            ended, newest_s = False, time.monotonic()
-            while not ended:
-                ended = fusion.wait(POLL_S) is not None  # asked before reading: what it wrote is all there
-                for record in tail.read():
-                    newest_s = time.monotonic()
-                    line = progress.note(record)
-                    if line is not None:
-                        display.keep(line)
-                display.status(progress.status())
-                if not ended and twin.status() is not None:
-                    raise twin.failure()
-                if time.monotonic() - newest_s > STALL_S:
-                    raise ProcessError(
-                        f"nothing has happened for {STALL_S:.0f} s; the learner wrote:\n{fusion.tail()}",
-                        f"All that both wrote: {fusion.log} and {twin.log}",
-                    )
-        finally:
-            display.close()
-        if progress.result is None:
-            raise (fusion if twin.status() is None else twin).failure()
+    ended, newest_s = False, time.monotonic()
+    try:
+        while not ended:
+            ended = learner.wait(POLL_S) is not None  # asked before reading: what it wrote is all there
+            for record in tail.read():
+                newest_s = time.monotonic()
+                line = progress.note(record)
+                if line is not None:
+                    display.keep(line)
+            display.status(progress.status())
+            if not ended and twin.status() is not None:
+                raise twin.failure()
+            if time.monotonic() - newest_s > STALL_S:
+                raise ProcessError(
+                    f"nothing has happened for {STALL_S:.0f} s; the learner wrote:\n{learner.tail()}",
+                    f"All that both wrote: {learner.log} and {twin.log}",
+                )
+    finally:
+        display.close()
+    if progress.result is None:
+        raise (learner if twin.status() is None else twin).failure()
 
 
 def conclude(folder: Path) -> int:
