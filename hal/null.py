@@ -48,6 +48,7 @@ class NullRobot:
         self._twist = STOP
         self._pose = (0.0, 0.0, 0.0)
         self._seq = 0
+        self._newest: Observation | None = None
         self._lock = threading.Lock()  # motion is asked for by whoever drives and whoever reads
         lidar, camera = profile.lidar, profile.camera
         full_turn = lidar.fov_rad > 2 * math.pi - 1e-3
@@ -84,6 +85,11 @@ class NullRobot:
     def read(self) -> Observation:
         """Return the newest of every sensor; each is new at its own rate."""
         self._advance(self.now())
+        if self._newest is None or self._newest.stamp_s != self._time_s:
+            self._newest = self._capture()
+        return self._newest
+
+    def _capture(self) -> Observation:
         self._seq += 1
         lidar = self._profile.lidar
         x_m, y_m, yaw_rad = self._pose
@@ -115,6 +121,7 @@ class NullRobot:
         self._advance(self.now())
         self._twist = STOP
         self._pose = (episode.start_m, episode.lateral_m, episode.yaw_rad)
+        self._newest = None
 
     def state(self) -> CourseState:
         """Ground truth now."""

@@ -4,8 +4,9 @@ Keys lie below the robot's name. Whether a value is fresh is decided from this t
 """
 
 from dataclasses import dataclass
+from typing import Any, Generic, TypeVar
 
-from zenoh import CongestionControl, Priority, Reliability
+from zenoh import Priority, Reliability
 
 from hal.codec import ros_type_of
 from hal.messages import (
@@ -22,16 +23,18 @@ from hal.messages import (
     Twist,
 )
 
+M = TypeVar("M")
+
 
 @dataclass(frozen=True, slots=True)
 class Qos:
-    """How samples travel. `latched`: a late reader gets the last one."""
+    """How samples travel. `latched`: a late reader gets the last one. `wait`: rather than drop what does not fit."""
 
     reliability: Reliability
     priority: Priority
     express: bool = False
     latched: bool = False
-    congestion: CongestionControl = CongestionControl.DROP
+    wait: bool = False
 
 
 # What must be new or not come at all: over UDP, past everything else.
@@ -42,15 +45,15 @@ PICTURE = Qos(Reliability.RELIABLE, Priority.DATA_LOW)
 REPORT = Qos(Reliability.RELIABLE, Priority.DATA)
 LATCHED = Qos(Reliability.RELIABLE, Priority.DATA, latched=True)
 # Lockstep: nothing is lost and nothing overtakes, so one link and one priority. To wait is harmless when time waits.
-LOCKSTEP = Qos(Reliability.RELIABLE, Priority.DATA, express=True, congestion=CongestionControl.BLOCK)
+LOCKSTEP = Qos(Reliability.RELIABLE, Priority.DATA, express=True, wait=True)
 
 
 @dataclass(frozen=True, slots=True)
-class Topic:
+class Topic(Generic[M]):
     """One line of the table."""
 
     key: str
-    kind: type
+    kind: type[M]
     rate_hz: float
     max_age_s: float
     qos: Qos
@@ -77,7 +80,20 @@ DECISION = Topic("lira/decision", Decision, 5.0, 1.0, REPORT)
 SIM_STATE = Topic("sim/state", CourseState, 20.0, 0.3, SENSOR)
 CLOCK = Topic("clock", Clock, 20.0, 0.3, URGENT)  # lockstep only: closes an observation
 
-TOPICS = (SCAN, CAMERA, ODOM, IMU, *RANGES.values(), BATTERY, CMD_VEL, TELEOP, APPLIED, DECISION, SIM_STATE, CLOCK)
+TOPICS: tuple[Topic[Any], ...] = (
+    SCAN,
+    CAMERA,
+    ODOM,
+    IMU,
+    *RANGES.values(),
+    BATTERY,
+    CMD_VEL,
+    TELEOP,
+    APPLIED,
+    DECISION,
+    SIM_STATE,
+    CLOCK,
+)
 
 # Keys that answer queries.
 INFO = "info"

@@ -1,0 +1,76 @@
+"""The HAL server's front desk: who am I talking to, and, for a twin, start afresh."""
+
+from collections.abc import Callable
+
+import msgspec
+
+from hal.bus import Bus
+from hal.errors import BusError, LiraError
+from hal.messages import Episode
+from hal.port import Arena
+from hal.profile import RobotProfile
+from hal.topics import INFO, RESET
+
+REALTIME, LOCKSTEP = "realtime", "lockstep"
+
+
+class Info(msgspec.Struct, frozen=True):
+    """What a robot says about itself. `arena` is whatever its twin says about its world, null for a real floor."""
+
+    profile: RobotProfile
+    mode: str
+    epoch: int
+    arena: msgspec.Raw = msgspec.Raw(b"null")
+
+    def to_json(self) -> bytes:
+        """Encode for the bus."""
+        return msgspec.json.encode(self)
+
+
+def info_from_json(data: bytes) -> Info:
+    """Decode what `Info.to_json` wrote. Raises `BusError`."""
+    try:
+        return msgspec.json.decode(data, type=Info)
+    except (msgspec.MsgspecError, ValueError) as error:
+        raise BusError(f"the robot says what is not understood: {error}", "Run one version on both sides.") from error
+
+
+class Desk:
+    """Answers `info` and, with an arena, `sim/reset`. To be polled by the thread that owns the robot.
+
+    The answer to a reset is the robot's time of it, as JSON: what was captured earlier is of the last episode.
+    """
+
+    def __init__(self, bus: Bus, info: Info, arena: Arena | None, now: Callable[[], float]) -> None:
+        self._info = info.to_json()
+        self._arena = arena
+        self._now = now
+        self._info_asked = bus.questions(INFO)
+        self._reset_asked = None if arena is None else bus.questions(RESET)
+
+    def serve(self, show: Callable[[], None]) -> None:
+        """Answer what was asked since the last time, and call `show` before each answer.
+
+        `show` publishes the robot's newest observation, so that whoever asks has it when the answer comes.
+        """
+        while (question := self._info_asked()) is not None:
+            show()
+            question.answer(self._info)
+        while self._reset_asked is not None and (question := self._reset_asked()) is not None:
+            reset_s = self._now()
+            if why := self._reset(question.payload):
+                question.refuse(why)
+            else:
+                show()
+                question.answer(msgspec.json.encode(reset_s))
+
+    def _reset(self, payload: bytes) -> str | None:
+        """Start the episode; returns why not."""
+        assert self._arena is not None
+        try:
+            self._arena.reset(msgspec.json.decode(payload, type=Episode))
+        except (msgspec.MsgspecError, ValueError) as error:
+            return f"not an episode: {error}"
+        except LiraError as error:
+            return str(error)
+        return None

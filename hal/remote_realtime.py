@@ -1,0 +1,151 @@
+"""A client's side of a robot in real time: it estimates the robot's clock and keeps decisions alive between decisions.
+
+Decisions come at 5 Hz and the robot stops after 0.25 s without a command, so a decision is sent again at 20 Hz. Two
+ages bound that. The robot judges when a command was last sent: a process that dies stops the robot one time-out after
+its last message. This side judges when it was decided: a loop that hangs is kept alive for 0.5 s, and the robot stops
+one time-out later. A person's hand is not a decision (it answers no observation): it streams by itself, is judged by
+its own stamp and never repeated.
+"""
+
+import threading
+import time
+
+from hal.bus import Bus, Publisher
+from hal.clock import ClockEstimate
+from hal.errors import BusError
+from hal.messages import STOP, Applied, Command, CourseState, Observation, Source, Twist
+from hal.senses import Sense, Senses
+from hal.topics import APPLIED, CMD_VEL, SIM_STATE, TELEOP
+
+REPEAT_HZ = 20.0
+DECISION_S = 0.5  # age at which a decision is no longer sent
+POLL_S = 0.005
+NAP_S = 0.02
+HEAR_S = 5.0
+MOMENT_S = 0.5
+FAREWELL = 3  # neutral commands at the end: one may be lost
+
+
+class RealTimeLink:
+    """Talks to a robot whose time passes by itself."""
+
+    def __init__(self, bus: Bus) -> None:
+        self._senses = Senses(bus)
+        self._states = Sense(bus, SIM_STATE)
+        self._results = bus.reader(APPLIED, depth=16)
+        self._publishers = {Source.POLICY: bus.publisher(CMD_VEL), Source.TELEOP: bus.publisher(TELEOP)}
+        self._clock = ClockEstimate()
+        self._epoch = -1
+        self._newest: Applied | None = None
+        self._held: dict[Source, Command] = {}
+        self._lock = threading.Lock()  # over the clock, the held decisions and the order of what is sent
+        self._stop = threading.Event()
+        self._thread = threading.Thread(target=self._run, name="remote-robot", daemon=True)
+
+    def start(self) -> None:
+        """Listen until the robot's clock is known. Raises `BusError` if it says nothing."""
+        self._thread.start()
+        deadline_s = time.monotonic() + HEAR_S
+        while not self._clock.known:
+            if time.monotonic() > deadline_s:
+                raise BusError("the robot says nothing about its wheels", "Look whether it still runs.")
+            time.sleep(POLL_S)
+
+    def refresh(self, reset_s: float) -> None:
+        """Forget what was captured before a reset, and wait a moment for what comes after it."""
+        before = self.read()
+        self._senses.forget(reset_s)
+        self._states.forget(reset_s)
+        deadline_s = time.monotonic() + MOMENT_S
+        while not _has_all(before, self.read()) and time.monotonic() < deadline_s:
+            time.sleep(POLL_S)
+
+    def now(self) -> float:
+        """Seconds on the robot's clock, as estimated."""
+        with self._lock:
+            return self._clock.now(time.monotonic())
+
+    def read(self) -> Observation:
+        """Return the newest of every sensor that is fresh."""
+        return self._senses.observe(self.now())
+
+    def state(self) -> CourseState | None:
+        """Ground truth, None if none comes within a moment."""
+        deadline_s = time.monotonic() + MOMENT_S
+        while (state := self._states.read(self.now())) is None and time.monotonic() < deadline_s:
+            time.sleep(POLL_S)
+        return state
+
+    def drive(self, command: Command) -> Applied:
+        """Send a command; returns what the robot last said it applied, stopped if it has not said so lately."""
+        decided = command.source is Source.POLICY or command.answers >= 0
+        with self._lock:
+            now_s = self._clock.now(time.monotonic())
+            if decided:
+                self._held[command.source] = command
+                self._send_held(now_s, command)
+            else:
+                _put(self._publishers[command.source], command, command.stamp_s)
+            newest = self._newest
+        if newest is None or now_s - newest.stamp_s > APPLIED.max_age_s:
+            return Applied(STOP, now_s)
+        return newest
+
+    def wait(self, until_s: float) -> None:
+        """Sleep until the robot's clock says so."""
+        while (left_s := until_s - self.now()) > 0:
+            time.sleep(min(left_s, NAP_S))
+
+    def close(self) -> None:
+        """Say stop, and fall silent."""
+        self._stop.set()
+        if self._thread.is_alive():
+            self._thread.join()
+            self._held.clear()
+            for _ in range(FAREWELL):
+                _put(self._publishers[Source.POLICY], Command(STOP, 0.0), self.now())
+
+    def _run(self) -> None:
+        repeat_s = time.monotonic()
+        while not self._stop.wait(POLL_S):
+            self._listen()
+            if (now_s := time.monotonic()) >= repeat_s:
+                repeat_s = now_s + 1.0 / REPEAT_HZ
+                self._repeat()
+
+    def _listen(self) -> None:
+        for received in self._results.poll():
+            attachment = received.attachment
+            if attachment is None:
+                continue
+            with self._lock:
+                if attachment.epoch != self._epoch:
+                    self._epoch = attachment.epoch
+                    self._clock.restart()
+                self._clock.note(attachment.time_s, received.arrived_s)
+                self._newest = received.message
+
+    def _repeat(self) -> None:
+        with self._lock:
+            if not self._clock.known:
+                return
+            now_s = self._clock.now(time.monotonic())
+            for command in list(self._held.values()):
+                self._send_held(now_s, command)
+
+    def _send_held(self, now_s: float, command: Command) -> None:
+        """Send a decision with the time of sending; let go of it when it is too old."""
+        if now_s - command.stamp_s > DECISION_S:
+            del self._held[command.source]
+        else:
+            _put(self._publishers[command.source], command, now_s)
+
+
+def _has_all(before: Observation, after: Observation) -> bool:
+    """Whether every sensor that spoke before speaks again."""
+    pairs = ((before.scan, after.scan), (before.image, after.image), (before.odom, after.odom))
+    return all(new is not None for old, new in pairs if old is not None)
+
+
+def _put(publisher: Publisher[Twist], command: Command, time_s: float) -> None:
+    publisher.put(command.twist, time_s, answers=command.answers, released=command.released)

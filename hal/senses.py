@@ -1,0 +1,70 @@
+"""A client's readers of everything a robot publishes, and the observation they add up to."""
+
+from typing import Any, Generic, Protocol, TypeVar
+
+from hal.bus import Bus
+from hal.messages import Observation
+from hal.topics import BATTERY, CAMERA, IMU, ODOM, RANGES, SCAN, Topic
+
+
+class Stamped(Protocol):
+    """A message with a capture time."""
+
+    @property
+    def stamp_s(self) -> float:
+        """Capture time on the robot's clock."""
+
+
+S = TypeVar("S", bound=Stamped)
+
+
+class Sense(Generic[S]):
+    """One topic: its newest value, or None once that is stale by the table."""
+
+    def __init__(self, bus: Bus, topic: Topic[S]) -> None:
+        self._max_age_s = topic.max_age_s
+        self._reader = bus.reader(topic)
+        self._not_before_s = float("-inf")
+        self.seq = -1  # the observation that the newest value belongs to
+
+    def forget(self, before_s: float) -> None:
+        """Return nothing any more that was captured before that time."""
+        self._not_before_s = before_s
+
+    def read(self, now_s: float) -> S | None:
+        """Return the newest value if it is fresh at `now_s` on the robot's clock."""
+        newest = self._reader.newest()
+        if newest is None or newest.message.stamp_s < self._not_before_s:
+            return None
+        if now_s - newest.message.stamp_s > self._max_age_s:
+            return None
+        if newest.attachment is not None:
+            self.seq = newest.attachment.seq
+        return newest.message
+
+
+class Senses:
+    """All sensors of a robot."""
+
+    def __init__(self, bus: Bus) -> None:
+        self._scan = Sense(bus, SCAN)
+        self._image = Sense(bus, CAMERA)
+        self._odom = Sense(bus, ODOM)
+        self._imu = Sense(bus, IMU)
+        self._battery = Sense(bus, BATTERY)
+        self._ranges = [Sense(bus, topic) for topic in RANGES.values()]
+
+    def forget(self, before_s: float) -> None:
+        """Return nothing any more that was captured before that time. A battery outlives an episode."""
+        senses: list[Sense[Any]] = [self._scan, self._image, self._odom, self._imu, *self._ranges]
+        for sense in senses:
+            sense.forget(before_s)
+
+    def observe(self, now_s: float, seq: int | None = None) -> Observation:
+        """Put the fresh ones together. Without a `seq` it is the newest that came with any of them."""
+        scan, image, odom = self._scan.read(now_s), self._image.read(now_s), self._odom.read(now_s)
+        imu, battery = self._imu.read(now_s), self._battery.read(now_s)
+        ranges = tuple(value for sense in self._ranges if (value := sense.read(now_s)) is not None)
+        if seq is None:
+            seq = max(self._scan.seq, self._image.seq, self._odom.seq, self._imu.seq, 0)
+        return Observation(seq, now_s, scan, image, odom, imu, battery, ranges)

@@ -1,0 +1,85 @@
+"""The HAL server in lockstep: time stands still until a command names the observation that was sent.
+
+Publish observation k, wait for policy's command that answers k, drive, publish what was applied, advance one period.
+A teleop command that was put before it is taken first. All of it travels reliably, on one link and at one priority,
+so what was put first is there first. With one seed, two runs are the same to the bit.
+"""
+
+import threading
+import time
+
+from hal.bus import Bus
+from hal.desk import Desk
+from hal.governed import GovernedRobot
+from hal.inlet import Inlet
+from hal.messages import Clock, Command, Observation
+from hal.outlet import Outlet
+from hal.port import Arena
+from hal.topics import APPLIED, CLOCK, LOCKSTEP, SIM_STATE
+
+REPEAT_S = 1.0  # wall time after which an unanswered observation is sent again, to whoever listens by now
+POLL_S = 0.0002
+IDLE_S = 0.1  # after this long without an answer, polls are rarer
+IDLE_POLL_S = 0.002
+
+
+class LockstepLoop:
+    """Serves one robot whose time passes only in `wait`."""
+
+    def __init__(self, robot: GovernedRobot, bus: Bus, desk: Desk, arena: Arena | None) -> None:
+        self._robot = robot
+        self._desk = desk
+        self._arena = arena
+        self._inlet = Inlet(bus)
+        self._outlet = Outlet(bus, robot.profile.camera, lockstep=True)
+        self._applied = bus.publisher(APPLIED, LOCKSTEP)
+        self._state = bus.publisher(SIM_STATE, LOCKSTEP)
+        self._clock = bus.publisher(CLOCK, LOCKSTEP)
+        self._observation = Observation(0, 0.0)
+
+    def run(self, stop: threading.Event) -> None:
+        """Serve until `stop` is set."""
+        while not stop.is_set():
+            self._show()
+            command = self._next_command(stop)
+            if command is None:
+                return
+            applied = self._robot.drive(command)
+            self._applied.put(applied, self._robot.now(), seq=command.answers, answers=command.answers)
+            self._robot.wait(self._robot.now() + self._robot.profile.period_s)
+
+    def _show(self) -> None:
+        """Publish the newest observation, the clock last: whoever sees it has the rest."""
+        self._observation = observation = self._robot.read()
+        now_s, seq = self._robot.now(), observation.seq
+        self._outlet.put(observation, now_s)
+        self._outlet.put_image(observation, now_s)
+        if self._arena is not None:
+            self._state.put(self._arena.state(), now_s, seq=seq)
+        self._clock.put(Clock(now_s), now_s, seq=seq)
+
+    def _next_command(self, stop: threading.Event) -> Command | None:
+        """Wait for the command that answers the observation; None once `stop` is set."""
+        since_s = shown_s = time.monotonic()
+        while not stop.is_set():
+            self._desk.serve(self._show)
+            answer = self._answer()
+            if answer is not None:
+                return answer
+            now_s = time.monotonic()
+            if now_s - shown_s > REPEAT_S:
+                self._show()
+                shown_s = now_s
+            time.sleep(POLL_S if now_s - since_s < IDLE_S else IDLE_POLL_S)
+        return None
+
+    def _answer(self) -> Command | None:
+        seq, now_s = self._observation.seq, self._robot.now()
+        # Policy is polled first: what teleop put before it has arrived by then.
+        answers = [command for command in self._inlet.policy(now_s) if command.answers == seq]
+        if not answers:
+            return None
+        for command in self._inlet.teleop(now_s):
+            if command.answers in (-1, seq):
+                self._robot.submit(command)
+        return answers[-1]

@@ -1,0 +1,123 @@
+"""The HAL server in real time: three threads, and the one that moves the wheels waits for none of the others.
+
+- commands: polls them, lets the governor judge, moves the base, strikes when they stop coming;
+- sensors: opens and reads the robot, publishes what is new, answers queries;
+- images: compresses and sends them, if anybody listens, and skips what it has no time for.
+"""
+
+import threading
+import time
+
+from hal.bus import Bus
+from hal.desk import Desk
+from hal.errors import SensorError
+from hal.governed import GovernedRobot
+from hal.inlet import Inlet
+from hal.messages import Applied, Observation
+from hal.outlet import Outlet
+from hal.port import Arena
+from hal.topics import APPLIED, SIM_STATE
+
+POLL_S = 0.002  # how long a command may lie
+WATCHDOG_S = 0.02
+SENSOR_S = 0.01
+JOIN_S = 2.0
+
+
+class CommandLoop:
+    """Moves the wheels: law 1 stands on this page."""
+
+    def __init__(self, robot: GovernedRobot, bus: Bus) -> None:
+        self._robot = robot
+        self._inlet = Inlet(bus)
+        self._applied = bus.publisher(APPLIED)
+
+    def run(self, stop: threading.Event) -> None:
+        """Obey and watch until `stop` is set; leaves the wheels at zero, whatever happens."""
+        watch_s = publish_s = time.monotonic()
+        try:
+            while not stop.wait(POLL_S):
+                now_s = time.monotonic()
+                commanded = self._obey()
+                if not commanded and now_s < watch_s:
+                    continue
+                watch_s = now_s + WATCHDOG_S
+                applied = self._robot.tick()
+                if commanded or now_s >= publish_s:
+                    publish_s = now_s + 1.0 / APPLIED.rate_hz
+                    self._publish(applied)
+        finally:
+            self._robot.halt()
+
+    def _obey(self) -> bool:
+        """Hand new commands to the governor, the person's first. Returns whether there were any."""
+        now_s = self._robot.now()
+        commands = self._inlet.teleop(now_s) + self._inlet.policy(now_s)
+        for command in commands:
+            self._robot.submit(command)
+        return bool(commands)
+
+    def _publish(self, applied: Applied) -> None:
+        self._applied.put(applied, self._robot.now(), answers=applied.answers)
+
+
+class SensorLoop:
+    """Publishes what is new, except images, which it hands to `ImageLoop`."""
+
+    def __init__(
+        self, robot: GovernedRobot, bus: Bus, outlet: Outlet, images: "ImageLoop", desk: Desk, arena: Arena | None
+    ) -> None:
+        self._robot = robot
+        self._outlet = outlet
+        self._images = images
+        self._desk = desk
+        self._arena = arena
+        self._state = bus.publisher(SIM_STATE)
+        self._state_due_s = 0.0
+
+    def run(self, stop: threading.Event) -> None:
+        """Publish until `stop` is set."""
+        while not stop.is_set():
+            self._show()
+            self._desk.serve(self._show)
+            self._robot.wait(self._robot.now() + SENSOR_S)
+
+    def _show(self) -> None:
+        observation, now_s = self._robot.read(), self._robot.now()
+        self._outlet.put(observation, now_s)
+        self._images.offer(observation)
+        if self._arena is not None and now_s >= self._state_due_s:
+            self._state_due_s = now_s + 1.0 / SIM_STATE.rate_hz
+            self._state.put(self._arena.state(), now_s, seq=observation.seq)
+
+
+class ImageLoop:
+    """Sends the newest image; one that is still waiting when the next comes is dropped."""
+
+    def __init__(self, robot: GovernedRobot, outlet: Outlet) -> None:
+        self._robot = robot
+        self._outlet = outlet
+        self._newest: Observation | None = None
+        self._offered = threading.Condition()
+        self.refused = 0  # images that could not be compressed
+
+    def offer(self, observation: Observation) -> None:
+        """Leave an observation to be sent."""
+        with self._offered:
+            self._newest = observation
+            self._offered.notify()
+
+    def run(self, stop: threading.Event) -> None:
+        """Send until `stop` is set."""
+        while not stop.is_set():
+            with self._offered:
+                self._offered.wait_for(lambda: self._newest is not None, timeout=JOIN_S / 4)
+                observation, self._newest = self._newest, None
+            if observation is not None and self._outlet.image_wanted:
+                self._send(observation)
+
+    def _send(self, observation: Observation) -> None:
+        try:
+            self._outlet.put_image(observation, self._robot.now())
+        except SensorError:
+            self.refused += 1

@@ -1,0 +1,83 @@
+"""The robots that have to fit the contract. To add one, write a context manager that yields a `Rig` and list it."""
+
+import threading
+import time
+import uuid
+from collections.abc import Callable, Iterator
+from contextlib import AbstractContextManager, contextmanager
+from dataclasses import dataclass
+
+from hal.bus import Bus
+from hal.governed import GovernedRobot
+from hal.null import NullRobot
+from hal.port import Arena, Robot
+from hal.profile import load_profile
+from hal.remote import RemoteArena, RemoteRobot
+from hal.server import HalServer
+from tools.processes import free_port
+
+PROFILE = load_profile("thesis-sim")
+
+
+@dataclass(frozen=True)
+class Rig:
+    """An open robot, the truth about it, and how its time passes."""
+
+    robot: Robot
+    arena: Arena
+    real_time: bool = False  # its time passes by itself
+    stepped: bool = False  # its time passes with policy's commands only, a period each
+
+
+@contextmanager
+def served(governed: GovernedRobot, arena: Arena, *, lockstep: bool) -> Iterator[Rig]:
+    """Put a robot on a bus of its own, and open it from the other end."""
+    name, endpoint, stop = f"t{uuid.uuid4().hex}", f"127.0.0.1:{free_port()}", threading.Event()
+    robot_bus, client_bus = Bus(name, listen=endpoint), Bus(name, connect=endpoint)
+    server = threading.Thread(target=HalServer(governed, robot_bus, arena, lockstep=lockstep).run, args=[stop])
+    server.start()
+    robot = RemoteRobot(client_bus)
+    try:
+        robot.open()
+        yield Rig(robot, RemoteArena(robot), real_time=not lockstep, stepped=lockstep)
+    finally:
+        robot.close()
+        stop.set()
+        server.join(10.0)
+        assert client_bus.close()
+        assert robot_bus.close()
+    assert not server.is_alive()
+
+
+@contextmanager
+def null() -> Iterator[Rig]:
+    inner = NullRobot(PROFILE)
+    robot = GovernedRobot(inner)
+    robot.open()
+    yield Rig(robot, inner)
+    robot.close()
+
+
+@contextmanager
+def null_real_time() -> Iterator[Rig]:
+    inner = NullRobot(PROFILE, time.monotonic, time.sleep)
+    with served(GovernedRobot(inner), inner, lockstep=False) as rig:
+        yield rig
+
+
+@contextmanager
+def null_lockstep() -> Iterator[Rig]:
+    inner = NullRobot(PROFILE)
+    with served(GovernedRobot(inner), inner, lockstep=True) as rig:
+        yield rig
+
+
+# `real_time` and `stepped` robots by name: some promises make no sense for them.
+REAL_TIME = {"null over zenoh"}
+STEPPED = {"null over zenoh in lockstep"}
+
+ROBOTS: dict[str, Callable[[], AbstractContextManager[Rig]]] = {
+    "null": null,
+    "null over zenoh": null_real_time,
+    "null over zenoh in lockstep": null_lockstep,
+}
