@@ -276,7 +276,7 @@ def test_a_disk_that_fills_up_is_reported_while_labels_still_fit(tmp_path, monke
         disk = os.statvfs(tmp_path)
         nearly_full = os.statvfs_result((*disk[:4], 300_000 // disk.f_frsize, *disk[5:]))
         monkeypatch.setattr("os.fstatvfs", lambda _: nearly_full)
-        with pytest.raises(StorageError, match="nearly full: 2.. kB"):
+        with pytest.raises(StorageError, match=r"nearly full: 2.. kB"):
             log.append(demonstration(1))
     assert holds(path, range(2))
     with pytest.raises(StorageError, match="nearly full"):

@@ -1,0 +1,155 @@
+"""One training step (50 updates of 32) beside a plain float32 PyTorch loop, and what it does to the control loop."""
+
+import statistics
+import time
+
+import numpy as np
+import torch
+from torch import Tensor, nn
+
+from fusion.learner import Label, Learner
+from fusion.networks import CameraNet, FusionNet, LidarNet
+from fusion.trainer import ProcessTrainer
+from tools.bench import Row
+
+RUNS = 5
+LABELS = 300
+UPDATES, BATCH = 50, 32
+CONTROL_PERIOD_S = 0.05
+TRAINING_STEPS = 3  # with the control loop beside them
+BINS = {16: 101, 32: 130}  # by filters: the simulated and the real robot
+
+TRUNKS = ("full", "frozen")
+
+
+def run() -> list[Row]:
+    """Return one row per network and kind of training. All on one thread."""
+    torch.set_num_threads(1)
+    rows: list[Row] = []
+    for filters, bins in BINS.items():
+        labels = random_labels(bins)
+        plain = PlainLearner(filters, labels)
+        learners = {trunks: make_learner(filters, trunks, labels) for trunks in TRUNKS}
+        contenders: dict[str, Learner | PlainLearner] = {"plain": plain, **learners}
+        seconds: dict[str, list[float]] = {name: [] for name in contenders}
+        for k in range(1 + RUNS):
+            for name, learner in contenders.items():
+                began = time.perf_counter()
+                learner.train_step()
+                if k > 0:  # the first is for what is slow the first time
+                    seconds[name].append(time.perf_counter() - began)
+        median = {name: statistics.median(values) for name, values in seconds.items()}
+        rows += [
+            {
+                "filters": filters,
+                "trunks": trunks,
+                "step_s": median[trunks],
+                "reference_s": median["plain"],
+                "speedup": median["plain"] / median[trunks],
+                **control_loop(learners[trunks], filters, labels),
+            }
+            for trunks in TRUNKS
+        ]
+    return rows
+
+
+def random_labels(bins: int) -> list[Label]:
+    """Noise: the time does not depend on what there is to learn."""
+    rng = np.random.default_rng(0)
+
+    def label() -> Label:
+        image = (rng.integers(0, 256, (32, 32)) / 255).astype(np.float32)
+        return Label(rng.random(bins, dtype=np.float32), image, (float(rng.random()), float(rng.random())), "human")
+
+    return [label() for _ in range(LABELS)]
+
+
+def make_learner(filters: int, trunks: str, labels: list[Label]) -> Learner:
+    """Prepare a learner that knows the labels."""
+    network = FusionNet.from_experts(CameraNet(filters), LidarNet(BINS[filters]))
+    learner = Learner(network, batch=BATCH, updates=UPDATES, seed=0, frozen_trunks=trunks == "frozen")
+    for label in labels:
+        learner.add(label)
+    return learner
+
+
+class PlainFusionNet(nn.Module):
+    """The fusion network of Appendix B, written down as one would."""
+
+    def __init__(self, bins: int, filters: int) -> None:
+        super().__init__()
+        self.camera = nn.Sequential(
+            nn.Conv2d(1, filters, 3),
+            nn.LeakyReLU(0.3),
+            nn.Conv2d(filters, filters, 3),
+            nn.LeakyReLU(0.3),
+            nn.MaxPool2d(2),
+            nn.Flatten(),
+        )
+        self.lidar = nn.Sequential(nn.Linear(bins, 64), nn.LeakyReLU(0.3), nn.Linear(64, 64), nn.LeakyReLU(0.3))
+        self.fusion = nn.Sequential(
+            nn.Linear(196 * filters + 64, 128),
+            nn.LeakyReLU(0.3),
+            nn.Linear(128, 128),
+            nn.LeakyReLU(0.3),
+            nn.Linear(128, 2),
+            nn.Tanh(),
+        )
+
+    def forward(self, scan: Tensor, image: Tensor) -> Tensor:
+        """Scan [n, bins] and image [n, 1, 32, 32] -> actions [n, 2]."""
+        actions: Tensor = self.fusion(torch.cat([self.camera(image), self.lidar(scan)], dim=1))
+        return actions
+
+
+class PlainLearner:
+    """The plain way to train: everything in float32, default Adam."""
+
+    def __init__(self, filters: int, labels: list[Label]) -> None:
+        self._network = PlainFusionNet(BINS[filters], filters)
+        self._adam = torch.optim.Adam(self._network.parameters(), lr=1e-3)
+        self._scans = torch.from_numpy(np.stack([label.scan for label in labels]))
+        self._images = torch.from_numpy(np.stack([label.image for label in labels])[:, None])
+        self._actions = torch.tensor([label.action for label in labels])
+
+    def train_step(self) -> None:
+        """Run one training step."""
+        for _ in range(UPDATES):
+            pick = torch.randint(len(self._actions), (BATCH,))
+            actions = self._network(self._scans[pick], self._images[pick])
+            loss = nn.functional.mse_loss(actions, self._actions[pick])
+            self._adam.zero_grad()
+            loss.backward()  # type: ignore[no-untyped-call]
+            self._adam.step()
+
+
+def control_loop(learner: Learner, filters: int, labels: list[Label]) -> Row:
+    """Decide at 20 Hz with all three networks while a process trains; a miss is a decision later than its period."""
+    policies = [CameraNet(filters), LidarNet(BINS[filters]), FusionNet(BINS[filters], filters)]
+    trainer = ProcessTrainer(learner)
+    took_s: list[float] = []
+    steps = 0
+    try:
+        next_s = time.monotonic()
+        while steps < TRAINING_STEPS:
+            next_s += CONTROL_PERIOD_S
+            time.sleep(max(0.0, next_s - time.monotonic()))
+            weights = trainer.poll(next_s)
+            if weights is not None:
+                policies[2].load_weights(weights)
+                steps += 1
+            label = labels[len(took_s) % len(labels)]
+            for policy in policies:
+                policy.act(label.scan, label.image)
+            trainer.add(label)
+            if not trainer.pending and steps < TRAINING_STEPS:
+                trainer.start(next_s)
+            took_s.append(time.monotonic() - next_s)
+            next_s = max(next_s, time.monotonic() - CONTROL_PERIOD_S)
+    finally:
+        trainer.close()
+    return {
+        "decisions": len(took_s),
+        "deadline_misses": sum(took > CONTROL_PERIOD_S for took in took_s),
+        "slowest_decision_ms": 1e3 * max(took_s),
+    }
