@@ -120,8 +120,7 @@ class Body:
             else:
                 clearance_m = ahead_m
             self.motion = after
-            rate_rad_s = drive.odometry_rate_rad_s(self._base, after)
-            self.odometry = drive.glide(self.odometry, after.linear_m_s, rate_rad_s, step_s)
+            self.odometry = drive.reckon(self._base, self.odometry, before, after, step_s)
             self.time_s += step_s
         self._judge(clearance_m, touched)
 

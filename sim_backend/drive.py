@@ -6,7 +6,7 @@
 """
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -83,7 +83,12 @@ def effective_track_m(base: Base) -> float:
     return base.effective_track_m or base.track_m
 
 
-def odometry_rate_rad_s(base: Base, now: Motion) -> Floats:
-    """Yaw rate that the firmware reports: the wheels' difference over its own idea of the track."""
-    track_m = base.odometry_track_m or base.track_m
-    return now.angular_rad_s * effective_track_m(base) / track_m
+def reckon(base: Base, odometry: Motion, before: Motion, after: Motion, duration_s: float) -> Motion:
+    """Carry the odometry on over a short move, as the firmware reckons: by its own idea of the track."""
+    skid = effective_track_m(base) / (base.odometry_track_m or base.track_m)
+    turn = after.yaw_rad - before.yaw_rad
+    ahead = before.yaw_rad + turn / 2
+    chord = (after.x_m - before.x_m) * np.cos(ahead) + (after.y_m - before.y_m) * np.sin(ahead)
+    linear = chord / np.sinc(turn / math.tau) / duration_s
+    there = glide(odometry, linear, turn * skid / duration_s, duration_s)
+    return replace(there, linear_m_s=after.linear_m_s, angular_rad_s=after.angular_rad_s * skid)

@@ -58,7 +58,23 @@ def test_wheels_brake_at_the_same_rate():
 def test_four_wheels_turn_the_body_less_than_the_firmware_thinks():
     steady = go(WHEELS, drive.motion(0, 0, 0), 0.0, 1.0, 2.0)
     assert steady.angular_rad_s == pytest.approx(0.215 / 0.260)
-    assert drive.odometry_rate_rad_s(WHEELS, steady) == pytest.approx(0.215 / 0.2378)
+    on = go(WHEELS, steady, 0.0, 1.0, 0.1)
+    odometry = drive.reckon(WHEELS, drive.motion(0, 0, 0), steady, on, 0.1)
+    assert odometry.angular_rad_s == pytest.approx(0.215 / 0.2378)
+    assert odometry.yaw_rad == pytest.approx(0.1 * 0.215 / 0.2378)
+
+
+def test_odometry_without_skid_is_the_truth():
+    start, odometry = drive.motion(1.0, 2.0, 0.4), drive.motion(0, 0, 0)
+    there = start
+    for v, w in ((0.5, 0.9), (1.0, 0.0), (-0.3, -1.0), (0.0, 1.0)):
+        after = go(KINEMATIC, there, v, w, 0.2)
+        odometry = drive.reckon(KINEMATIC, odometry, there, after, 0.2)
+        there = after
+    dx, dy = there.x_m - 1.0, there.y_m - 2.0
+    assert odometry.x_m == pytest.approx(dx * math.cos(0.4) + dy * math.sin(0.4))
+    assert odometry.y_m == pytest.approx(dy * math.cos(0.4) - dx * math.sin(0.4))
+    assert odometry.yaw_rad == pytest.approx(there.yaw_rad - 0.4)
 
 
 def test_no_wheel_turns_faster_than_the_firmware_lets_it():
