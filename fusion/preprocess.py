@@ -194,7 +194,10 @@ def _raw_gray(image: Image) -> ByteArray:
 
 
 def _decode(image: CompressedImage, px: int) -> ByteArray:
-    """Decode to gray, a JPEG straight to the smallest size that still has `px` pixels a side."""
+    """Decode to gray, a JPEG straight to the smallest size that has twice `px` pixels a side.
+
+    With fewer, the decoder's blocks are too coarse for the areas averaged afterwards.
+    """
     data = image.data
     if data[:2] == b"\xff\xd8":
         size, whole, reduce = _jpeg_size(data), data.rstrip(b"\0").endswith(_JPEG_END), True
@@ -208,7 +211,7 @@ def _decode(image: CompressedImage, px: int) -> ByteArray:
         raise ReadingError("image truncated", what, "Check the link to the camera; a later image may be whole.")
     if size is None or not 0 < min(size) <= max(size) <= MAX_IMAGE_PX:
         raise _broken(image)
-    scale = next(k for k in _REDUCED_GRAY if k == 1 or (reduce and min(size) // k >= px))
+    scale = next(k for k in _REDUCED_GRAY if k == 1 or (reduce and min(size) // k >= 2 * px))
     try:
         gray = cv2.imdecode(np.frombuffer(data, np.uint8), _REDUCED_GRAY[scale])
     except cv2.error as error:
