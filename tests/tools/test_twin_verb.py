@@ -2,8 +2,13 @@ import signal
 import subprocess
 import sys
 
+import msgspec
 import pytest
 
+from hal.bus import Bus
+from hal.messages import STOP, Command, Twist
+from hal.remote import RemoteArena, RemoteRobot
+from sim_backend.world import World, load_world
 from tools.processes import ChildProcess, free_port, lira_command
 
 
@@ -75,3 +80,25 @@ def test_a_port_in_use_and_a_name_in_use_are_refused(tmp_path):
         same_name = lira("twin", "--name", name, "--listen", f"127.0.0.1:{other}")
         assert same_name.returncode == 2
         assert f"a robot named '{name}' already" in same_name.stderr
+
+
+def test_whoever_connects_learns_the_world_and_can_drive(tmp_path):
+    port = free_port()
+    name, endpoint = f"verb_{port}", f"127.0.0.1:{port}"
+    command = lira_command(
+        "twin", "--name", name, "--listen", endpoint, "--world", "race", "--layout", "4", "--lockstep"
+    )
+    with ChildProcess("the twin", command, tmp_path / "log") as twin:
+        twin.wait_ready("serves world", 60.0)
+        bus = Bus(name, connect=endpoint)
+        robot = RemoteRobot(bus)
+        robot.open()
+        arena = RemoteArena(robot)
+        assert msgspec.json.decode(arena.info, type=World) == load_world("race")
+        before = arena.state()
+        for twist in (STOP, *[Twist(0.5, 0.0)] * 5):
+            robot.drive(Command(twist, robot.now(), answers=robot.read().seq))
+            robot.wait(robot.now() + robot.profile.period_s)
+        assert arena.state().x_m - before.x_m == pytest.approx(0.5, abs=0.15)
+        robot.close()
+        bus.close()
