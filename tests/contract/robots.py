@@ -14,6 +14,7 @@ from hal.port import Arena, Robot
 from hal.profile import load_profile
 from hal.remote import RemoteArena, RemoteRobot
 from hal.server import HalServer
+from sim_backend.twin import Twin
 from tools.processes import free_port
 
 PROFILE = load_profile("thesis-sim")
@@ -72,12 +73,42 @@ def null_lockstep() -> Iterator[Rig]:
         yield rig
 
 
+def make_twin(realtime_factor: float | None = None) -> Twin:
+    return Twin(PROFILE, "line", realtime_factor=realtime_factor)
+
+
+@contextmanager
+def twin() -> Iterator[Rig]:
+    inner = make_twin()
+    robot = GovernedRobot(inner)
+    robot.open()
+    yield Rig(robot, inner)
+    robot.close()
+
+
+@contextmanager
+def twin_real_time() -> Iterator[Rig]:
+    inner = make_twin(1.0)
+    with served(GovernedRobot(inner), inner, lockstep=False) as rig:
+        yield rig
+
+
+@contextmanager
+def twin_lockstep() -> Iterator[Rig]:
+    inner = make_twin()
+    with served(GovernedRobot(inner), inner, lockstep=True) as rig:
+        yield rig
+
+
 # `real_time` and `stepped` robots by name: some promises make no sense for them.
-REAL_TIME = {"null over zenoh"}
-STEPPED = {"null over zenoh in lockstep"}
+REAL_TIME = {"null over zenoh", "twin over zenoh"}
+STEPPED = {"null over zenoh in lockstep", "twin over zenoh in lockstep"}
 
 ROBOTS: dict[str, Callable[[], AbstractContextManager[Rig]]] = {
     "null": null,
     "null over zenoh": null_real_time,
     "null over zenoh in lockstep": null_lockstep,
+    "twin": twin,
+    "twin over zenoh": twin_real_time,
+    "twin over zenoh in lockstep": twin_lockstep,
 }
