@@ -1,6 +1,9 @@
 import os
 import signal
+import subprocess
+import sys
 import time
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -135,3 +138,34 @@ def test_closing_in_the_middle_of_a_long_training_step_is_bounded():
     assert time.monotonic() - began < 10.0
     assert not trainer._process.is_alive()
     trainer.close()
+
+
+OWNER = """
+import time
+from fusion.learner import Learner
+from fusion.networks import LidarNet
+from fusion.trainer import ProcessTrainer
+trainer = ProcessTrainer(Learner(LidarNet(101), seed=0, frozen_trunks=False))
+print(trainer.pid, flush=True)
+time.sleep(600)
+"""
+
+
+def is_running(pid: int) -> bool:
+    try:
+        return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0] != "Z"
+    except FileNotFoundError:
+        return False
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="looks into /proc")
+def test_the_process_goes_when_its_parent_is_killed():
+    owner = subprocess.Popen([sys.executable, "-c", OWNER], stdout=subprocess.PIPE, text=True)
+    pid = int(owner.stdout.readline())
+    assert is_running(pid)
+    owner.kill()
+    owner.communicate()
+    deadline = time.monotonic() + WAIT_S
+    while is_running(pid) and time.monotonic() < deadline:
+        time.sleep(0.05)
+    assert not is_running(pid)
