@@ -38,6 +38,7 @@ class RealTimeLink:
         self._epoch = -1
         self._newest: Applied | None = None
         self._held: dict[Source, Command] = {}
+        self._repeat_s = 0.0
         self._lock = threading.Lock()  # over the clock, the held decisions and the order of what is sent
         self._stop = threading.Event()
         self._thread = threading.Thread(target=self._run, name="remote-robot", daemon=True)
@@ -106,12 +107,9 @@ class RealTimeLink:
                 _put(self._publishers[Source.POLICY], Command(STOP, 0.0), self.now())
 
     def _run(self) -> None:
-        repeat_s = time.monotonic()
         while not self._stop.wait(POLL_S):
             self._listen()
-            if (now_s := time.monotonic()) >= repeat_s:
-                repeat_s = now_s + 1.0 / REPEAT_HZ
-                self._repeat()
+            self._repeat()
 
     def _listen(self) -> None:
         for received in self._results.poll():
@@ -122,14 +120,15 @@ class RealTimeLink:
                 if attachment.epoch != self._epoch:
                     self._epoch = attachment.epoch
                     self._clock.restart()
+                    self._repeat_s = 0.0
                 self._clock.note(attachment.time_s, received.arrived_s)
                 self._newest = received.message
 
     def _repeat(self) -> None:
         with self._lock:
-            if not self._clock.known:
+            if not self._clock.known or (now_s := self._clock.now(time.monotonic())) < self._repeat_s:
                 return
-            now_s = self._clock.now(time.monotonic())
+            self._repeat_s = now_s + 1.0 / REPEAT_HZ
             for command in list(self._held.values()):
                 self._send_held(now_s, command)
 

@@ -20,7 +20,7 @@ from hal.topics import APPLIED, SIM_STATE
 
 POLL_S = 0.002  # how long a command may lie
 WATCHDOG_S = 0.02
-SENSOR_S = 0.01
+SENSOR_S = 0.005  # how long a new reading may lie
 JOIN_S = 2.0
 
 
@@ -80,7 +80,7 @@ class SensorLoop:
         while not stop.is_set():
             self._show()
             self._desk.serve(self._show)
-            self._robot.wait(self._robot.now() + SENSOR_S)
+            self._robot.pass_time(self._robot.now() + SENSOR_S)
 
     def _show(self) -> None:
         observation, now_s = self._robot.read(), self._robot.now()

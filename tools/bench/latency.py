@@ -1,0 +1,114 @@
+"""From a capture to the applied command: HAL server, bus, client, bus, governor, beside a bare zenoh echo.
+
+Both ends of the interval are on the robot's clock: the scan's capture time and the time at which the wheels got the
+command that answers it. The echo sends the same scan's bytes there and back, in the same run.
+"""
+
+import statistics
+import sys
+import time
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+import numpy as np
+
+from hal.attachment import Attachment
+from hal.bus import Bus
+from hal.codec import encode
+from hal.errors import BusError
+from hal.messages import STOP, Command, LaserScan
+from hal.remote import RemoteRobot
+from hal.topics import APPLIED, SCAN
+from tools.bench import Row, echo, null_robot
+from tools.processes import ChildProcess, free_port
+
+RUNS = 3
+SCANS = 150
+SCAN_HZ = 40.0
+WARM_UP = 20
+READY_S = 30.0
+LIMIT_S = 30.0
+POLL_S = 0.0005
+
+
+def run() -> list[Row]:
+    """Return one row: medians over several runs in fresh processes."""
+    runs = [measure() for _ in range(RUNS)]
+    row: Row = {name: statistics.median(one[name] for one in runs) for name in runs[0]}
+    return [{"profile": "thesis-sim", "scan_hz": SCAN_HZ, "samples": SCANS, **row}]
+
+
+def measure() -> dict[str, float]:
+    """Measure the stack and the echo side by side."""
+    port, echo_port = free_port(), free_port()
+    name, endpoint, echo_endpoint = f"bench_{port}", f"127.0.0.1:{port}", f"127.0.0.1:{echo_port}"
+    python = [sys.executable, "-P", "-m"]
+    robot = [*python, "tools.bench.null_robot", name, endpoint, str(SCAN_HZ)]
+    with (
+        TemporaryDirectory() as folder,
+        ChildProcess("the robot", robot, Path(folder) / "robot.log") as server,
+        ChildProcess("the echo", [*python, "tools.bench.echo", echo_endpoint], Path(folder) / "echo.log") as mirror,
+    ):
+        server.wait_ready(null_robot.READY, READY_S)
+        mirror.wait_ready(echo.READY, READY_S)
+        stack_ms, scan = measure_stack(name, endpoint)
+        echo_ms = measure_echo(echo_endpoint, scan)
+    p50, p99 = (float(np.percentile(stack_ms, q)) for q in (50, 99))
+    echo_p50, echo_p99 = (float(np.percentile(echo_ms, q)) for q in (50, 99))
+    return {
+        "p50_ms": p50,
+        "p99_ms": p99,
+        "echo_p50_ms": echo_p50,
+        "echo_p99_ms": echo_p99,
+        "ratio_p50": p50 / echo_p50,
+        "ratio_p99": p99 / echo_p99,
+    }
+
+
+def measure_stack(name: str, endpoint: str) -> tuple[list[float], LaserScan]:
+    """Answer every scan at once, and find when each answer was applied."""
+    bus = Bus(name, connect=endpoint)
+    robot = RemoteRobot(bus)
+    try:
+        robot.open()
+        results = bus.reader(APPLIED, depth=64)
+        scans = bus.reader(SCAN)
+        captured_s: dict[int, float] = {}
+        taken_ms: dict[int, float] = {}
+        deadline_s = time.monotonic() + LIMIT_S
+        while len(taken_ms) < SCANS + WARM_UP and time.monotonic() < deadline_s:
+            for received in scans.poll():
+                if received.attachment is not None:
+                    seq = received.attachment.seq
+                    captured_s[seq] = received.message.stamp_s
+                    robot.drive(Command(STOP, robot.now(), answers=seq))
+            for result in results.poll():
+                seq = result.message.answers
+                if seq in captured_s:
+                    taken_ms.setdefault(seq, 1e3 * (result.message.stamp_s - captured_s[seq]))
+            time.sleep(POLL_S)
+        newest = scans.newest()
+        if newest is None or len(taken_ms) < SCANS + WARM_UP:
+            raise BusError(f"{len(taken_ms)} of {SCANS + WARM_UP} commands were applied", "Is the machine overloaded?")
+        return list(taken_ms.values())[WARM_UP:], newest.message
+    finally:
+        robot.close()
+        bus.close()
+
+
+def measure_echo(endpoint: str, scan: LaserScan) -> list[float]:
+    """Send the scan's bytes to the echo and back, at the same rate."""
+    payload, attachment = encode(scan), Attachment(1, 1, 1).to_bytes()
+    taken_ms: list[float] = []
+    with echo.session("connect", endpoint) as bare:
+        answers = bare.declare_subscriber(echo.ANSWER)
+        questions = echo.publisher(bare, echo.QUESTION)
+        while not questions.matching_status.matching:  # type: ignore[attr-defined]  # its stub says bool
+            time.sleep(POLL_S)
+        for _ in range(SCANS + WARM_UP):
+            began_s = time.perf_counter()
+            questions.put(payload, attachment=attachment)
+            answers.recv()
+            taken_ms.append(1e3 * (time.perf_counter() - began_s))
+            time.sleep(1.0 / SCAN_HZ)
+    return taken_ms[WARM_UP:]

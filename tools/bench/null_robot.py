@@ -1,0 +1,36 @@
+"""A HAL server in a process of its own with no robot behind it: `python -m tools.bench.null_robot NAME HOST:PORT`."""
+
+import sys
+import time
+
+import msgspec
+
+from hal.bus import Bus
+from hal.governed import GovernedRobot
+from hal.null import NullRobot
+from hal.profile import RobotProfile, load_profile
+from hal.server import HalServer, stop_on_signal
+
+READY = "null robot serves"
+
+
+def profile_at(scan_hz: float) -> RobotProfile:
+    """The thesis's robot with a lidar of this rate."""
+    profile = load_profile("thesis-sim")
+    return msgspec.structs.replace(profile, lidar=msgspec.structs.replace(profile.lidar, rate_hz=scan_hz))
+
+
+def main(name: str, endpoint: str, scan_hz: float) -> None:
+    """Serve in real time until SIGTERM."""
+    robot = NullRobot(profile_at(scan_hz), time.monotonic, time.sleep)
+    bus = Bus(name, listen=endpoint)
+    try:
+        with stop_on_signal() as stop:
+            server = HalServer(GovernedRobot(robot), bus, robot, ready=lambda: print(f"{READY} {name}", flush=True))
+            server.run(stop)
+    finally:
+        bus.close()
+
+
+if __name__ == "__main__":
+    main(sys.argv[1], sys.argv[2], float(sys.argv[3]) if len(sys.argv) > 3 else 10.0)
