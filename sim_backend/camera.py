@@ -1,7 +1,7 @@
 """The camera: a pinhole with its own width and height of view, rendered by pybullet.
 
 TinyRenderer runs on any machine but does not anti-alias, so a small picture is rendered larger and averaged down.
-The EGL plugin draws with OpenGL and is much faster for large pictures.
+The EGL plugin draws large pictures with OpenGL, which is faster where the machine has a graphics card.
 """
 
 import math
@@ -19,8 +19,6 @@ FAR_M = 60.0
 SMALL_PX = 160 * 120
 OVERSAMPLE_WIDE = 8
 OVERSAMPLE_HIGH = 3
-# TinyRenderer takes 60 ms for 640x480: what it draws of a large picture is halved until it has this many pixels.
-TINY_LIMIT_PX = 320 * 240
 JPEG_LIMIT_BYTES = 64_000
 JPEG_QUALITIES = (90, 75, 60, 45, 30, 15, 5)
 
@@ -31,13 +29,17 @@ class PinholeCamera:
     def __init__(self, camera: Camera, scene: Scene) -> None:
         self._camera = camera
         self.scene = scene
-        self._width_px, self._height_px, self._average = render_size(camera, egl=scene.egl)
-        self._background = background(camera, self._width_px, self._height_px, scene)
+        self._average = camera.width_px * camera.height_px <= SMALL_PX
+        wide, high = (OVERSAMPLE_WIDE, OVERSAMPLE_HIGH) if self._average else (1, 1)
+        width_px, height_px = camera.width_px * wide, camera.height_px * high
+        self._background = background(camera, width_px, height_px, scene)
         # TinyRenderer samples each pixel at its corner instead of its middle, OpenGL does not.
-        shift = (0.0, 0.0) if scene.egl else (1 / self._width_px, 1 / self._height_px)
-        self._projection = projection_matrix(camera, shift)
+        shift = (0.0, 0.0) if scene.egl else (1 / width_px, 1 / height_px)
         bullet = scene.bullet
         self._how = {
+            "width": width_px,
+            "height": height_px,
+            "projectionMatrix": projection_matrix(camera, shift),
             "shadow": 0,
             "lightAmbientCoeff": 1.0,
             "lightDiffuseCoeff": 0.0,
@@ -48,27 +50,18 @@ class PinholeCamera:
             "physicsClientId": scene.client,
         }
 
+    def request(self, x_m: float, y_m: float, yaw_rad: float) -> dict[str, object]:
+        """Return the arguments of pybullet's `getCameraImage` from a robot at this pose."""
+        return {**self._how, "viewMatrix": view_matrix(self._camera, x_m, y_m, yaw_rad)}
+
     def render(self, x_m: float, y_m: float, yaw_rad: float) -> ByteArray:
         """Picture from a robot at this pose, gray like everything in a world: uint8 [height, width]."""
-        view = view_matrix(self._camera, x_m, y_m, yaw_rad)
-        _, _, pixels, depth, _ = self.scene.bullet.getCameraImage(
-            self._width_px, self._height_px, view, self._projection, **self._how
-        )
+        _, _, pixels, depth, _ = self.scene.bullet.getCameraImage(**self.request(x_m, y_m, yaw_rad))
         picture: ByteArray = np.where(depth < 1.0, pixels[..., 0], self._background)
         if self._average:
             size = (self._camera.width_px, self._camera.height_px)
             picture = np.asarray(cv2.resize(picture, size, interpolation=cv2.INTER_AREA), dtype=np.uint8)
         return picture
-
-
-def render_size(camera: Camera, *, egl: bool) -> tuple[int, int, bool]:
-    """Width and height to render, and whether to average down from that to the camera's own."""
-    width, height = camera.width_px, camera.height_px
-    if width * height <= SMALL_PX:
-        return width * OVERSAMPLE_WIDE, height * OVERSAMPLE_HIGH, True
-    while not egl and width * height > TINY_LIMIT_PX:
-        width, height = width // 2, height // 2
-    return width, height, False
 
 
 def background(camera: Camera, width_px: int, height_px: int, scene: Scene) -> ByteArray:

@@ -29,17 +29,24 @@ class RayLidar:
         self._rng = rng
         self._angles, self._increment = beam_angles(lidar)
 
-    def scan(self, x_m: float, y_m: float, yaw_rad: float, stamp_s: float) -> LaserScan:
-        """One turn, captured at an instant. Ranges after REP-117: +inf no return, -inf too close, nan dropped out."""
+    def request(self, x_m: float, y_m: float, yaw_rad: float) -> dict[str, object]:
+        """Return the arguments of pybullet's `rayTestBatch` from a robot at this pose."""
         lidar = self._lidar
         origin = [x_m + lidar.x_m * math.cos(yaw_rad), y_m + lidar.x_m * math.sin(yaw_rad), lidar.z_m]
         ends = np.empty((lidar.beams, 3))
         ends[:, 0] = origin[0] + lidar.range_max_m * np.cos(self._angles + yaw_rad)
         ends[:, 1] = origin[1] + lidar.range_max_m * np.sin(self._angles + yaw_rad)
         ends[:, 2] = lidar.z_m
-        hits = self._scene.bullet.rayTestBatch(
-            [origin] * lidar.beams, ends.tolist(), physicsClientId=self._scene.client
-        )
+        return {
+            "rayFromPositions": [origin] * lidar.beams,
+            "rayToPositions": ends.tolist(),
+            "physicsClientId": self._scene.client,
+        }
+
+    def scan(self, x_m: float, y_m: float, yaw_rad: float, stamp_s: float) -> LaserScan:
+        """One turn, captured at an instant. Ranges after REP-117: +inf no return, -inf too close, nan dropped out."""
+        lidar = self._lidar
+        hits = self._scene.bullet.rayTestBatch(**self.request(x_m, y_m, yaw_rad))
         ranges = np.array([hit[2] if hit[0] >= 0 else math.inf for hit in hits]) * lidar.range_max_m
         return LaserScan(
             stamp_s=stamp_s,

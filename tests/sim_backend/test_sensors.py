@@ -167,7 +167,7 @@ def test_the_rosbots_camera_travels_as_jpeg(sensors):
     assert isinstance(image, CompressedImage)
     assert len(image.data) < 64_000
     decoded = cv2.imdecode(np.frombuffer(image.data, np.uint8), cv2.IMREAD_COLOR)
-    assert decoded.shape == (240, 320, 3)  # TinyRenderer draws half
+    assert decoded.shape == (480, 640, 3)
 
 
 def test_camera_noise_has_its_size_and_its_seed(sensors):
