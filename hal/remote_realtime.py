@@ -108,8 +108,11 @@ class RealTimeLink:
 
     def _run(self) -> None:
         while not self._stop.wait(POLL_S):
-            self._listen()
-            self._repeat()
+            try:
+                self._listen()
+                self._repeat()
+            except BusError:
+                return  # the bus was closed first: whoever drives or reads hears of it
 
     def _listen(self) -> None:
         for received in self._results.poll():

@@ -36,7 +36,8 @@ class Sense(Generic[S]):
         newest = self._reader.newest()
         if newest is None or newest.message.stamp_s < self._not_before_s:
             return None
-        if now_s - newest.message.stamp_s > self._max_age_s:
+        # Far ahead is no better than far behind: it was captured before the robot's clock started anew.
+        if abs(now_s - newest.message.stamp_s) > self._max_age_s:
             return None
         if newest.attachment is not None:
             self.seq = newest.attachment.seq

@@ -1,0 +1,52 @@
+"""The estimate of the robot's clock."""
+
+import pytest
+
+from hal.clock import WINDOW_S, ClockEstimate
+
+
+def test_the_most_prompt_message_counts():
+    clock = ClockEstimate()
+    assert not clock.known
+    for local_s, delay_s in ((10.0, 0.05), (10.05, 0.002), (10.1, 0.2)):
+        clock.note(local_s + 100.0 - delay_s, local_s)
+    assert clock.known
+    assert clock.now(10.1) == pytest.approx(110.098)
+
+
+def test_it_is_never_ahead_of_a_robot_whose_time_runs_as_ours():
+    clock = ClockEstimate()
+    for step in range(100):
+        local_s = step * 0.05
+        clock.note(local_s - 5.0 - 0.01 * (step % 7), local_s)
+        assert clock.now(local_s) <= local_s - 5.0 + 1e-9
+
+
+def test_it_follows_a_robot_whose_time_runs_slower():
+    clock = ClockEstimate()
+    for step in range(200):
+        local_s = step * 0.05
+        clock.note(0.6 * local_s, local_s)
+    assert clock.now(local_s) - 0.6 * local_s <= 0.4 * WINDOW_S + 1e-9
+
+
+def test_it_never_runs_back():
+    clock = ClockEstimate()
+    clock.note(100.0, 10.0)
+    clock.note(100.2, 10.3)
+    seen = [clock.now(10.3)]
+    clock.note(100.3, 10.6)
+    seen.append(clock.now(10.6))
+    clock.note(100.3, 10.9)
+    seen.append(clock.now(10.9))
+    assert seen == sorted(seen)
+
+
+def test_a_restarted_robot_starts_a_new_estimate():
+    clock = ClockEstimate()
+    clock.note(1000.0, 10.0)
+    clock.now(10.0)
+    clock.restart()
+    assert not clock.known
+    clock.note(1.0, 11.0)
+    assert clock.now(11.5) == 1.5

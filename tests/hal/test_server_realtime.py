@@ -1,0 +1,185 @@
+"""The HAL server in real time: whatever fails, the wheels get zero, and nothing fails silently."""
+
+import threading
+import time
+
+import pytest
+import zenoh
+from wiring import PROFILE, joined, new_endpoint, new_name, real_time_null, remote, served, wait_for
+
+from hal.bus import Bus
+from hal.codec import encode
+from hal.errors import BusError, DeviceError
+from hal.governed import GovernedRobot
+from hal.messages import STOP, Command, Reason, Source, Twist
+from hal.null import NullRobot
+from hal.profile import STOP_BUDGET_S
+from hal.remote import RemoteRobot
+from hal.remote_realtime import DECISION_S
+from hal.server import HalServer
+from hal.topics import APPLIED, CMD_VEL
+
+GO = Twist(0.5, 0.0)
+
+
+def get_going(client):
+    """Arm and drive until the robot says that it moves."""
+    for twist in (STOP, GO):
+        wait_for(lambda twist=twist: client.drive(Command(twist, client.now())).reason is Reason.OK)
+    wait_for(lambda: client.drive(Command(GO, client.now())).twist == GO)
+
+
+def is_still(robot):
+    return robot.inner.state().linear_m_s == 0.0
+
+
+def test_a_decision_is_kept_alive_and_a_hung_loop_is_not():
+    with served(real_time_null()) as robot, remote(robot) as client:
+        get_going(client)
+        decided_s = client.now()
+        client.drive(Command(GO, decided_s))
+        time.sleep(0.4)  # longer than any time-out of the governor
+        assert not is_still(robot)
+        wait_for(lambda: is_still(robot))
+        assert robot.inner.now() - decided_s < DECISION_S + STOP_BUDGET_S + 0.2
+        assert client.drive(Command(GO, client.now())).twist == STOP
+
+
+def test_a_hand_is_not_kept_alive():
+    with served(real_time_null()) as robot, remote(robot) as client:
+        get_going(client)
+        wait_for(lambda: client.drive(Command(GO, client.now(), Source.TELEOP)).source is Source.TELEOP)
+        commanded_s = robot.inner.now()
+        wait_for(lambda: is_still(robot))
+        # Policy's decision is still being repeated, and does not take over.
+        assert robot.inner.now() - commanded_s < STOP_BUDGET_S + 0.1
+
+
+def test_what_is_stale_is_none():
+    with served(real_time_null()) as robot, remote(robot) as client:
+        wait_for(lambda: client.read().scan is not None and client.read().odom is not None)
+        robot.stop.set()
+        robot.join()
+        wait_for(lambda: client.read().scan is None and client.read().odom is None, 2.0)
+        assert client.drive(Command(GO, client.now())).reason is Reason.NO_COMMAND
+
+
+def test_a_sensor_that_never_answers_leaves_the_wheels_in_control():
+    leave = threading.Event()
+
+    class Stuck(NullRobot):
+        stuck = False
+
+        def read(self):
+            if self.stuck:
+                leave.wait(20.0)
+            return super().read()
+
+    with served(real_time_null(Stuck)) as robot, remote(robot) as client:
+        get_going(client)
+        robot.inner.stuck = True
+        time.sleep(0.1)
+        assert client.drive(Command(GO, client.now())).twist == GO
+        wait_for(lambda: is_still(robot), DECISION_S + STOP_BUDGET_S + 0.5)
+        get_going(client)
+        began_s = time.monotonic()
+        robot.stop.set()
+        wait_for(lambda: is_still(robot), 1.0)
+        robot.join()
+        assert time.monotonic() - began_s < 6.0
+        leave.set()
+
+
+@pytest.mark.parametrize("method", ["read", "drive"])
+def test_a_device_that_fails_stops_the_server_and_says_why(method):
+    class Failing(NullRobot):
+        failing = False
+
+        def read(self):
+            if self.failing and method == "read":
+                raise DeviceError("the lidar is gone", "Plug it in.")
+            return super().read()
+
+        def drive(self, command):
+            if self.failing and method == "drive" and command.twist != STOP:
+                raise DeviceError("the base is gone", "Plug it in.")
+            return super().drive(command)
+
+    with served(real_time_null(Failing)) as robot, remote(robot) as client:
+        get_going(client)
+        robot.inner.failing = True
+        robot.join()
+        assert isinstance(robot.failure, DeviceError)
+        assert robot.stop.is_set()
+        assert is_still(robot)
+
+
+def test_a_robot_that_does_not_open_says_why():
+    class Broken(NullRobot):
+        def open(self):
+            raise DeviceError("no lidar", "Plug it in.")
+
+    with served(real_time_null(Broken)) as robot:
+        robot.join()
+        assert isinstance(robot.failure, DeviceError)
+
+
+def test_a_second_robot_of_the_same_name_is_refused():
+    with served(real_time_null()) as robot:
+        rival = Bus(robot.name, listen=new_endpoint())
+        try:
+            with pytest.raises(BusError, match=f"'{robot.name}' already runs.*another name"):
+                HalServer(GovernedRobot(real_time_null()), rival).run(threading.Event())
+        finally:
+            rival.close()
+
+
+def test_the_name_is_free_again_afterwards():
+    name = new_name()
+    for _ in range(2):
+        bus, stop = Bus(name, listen=new_endpoint()), threading.Event()
+        HalServer(GovernedRobot(real_time_null()), bus, ready=stop.set).run(stop)
+        bus.close()
+
+
+def test_a_ros_peer_without_attachment_drives_too():
+    with served(real_time_null()) as robot, joined(robot) as bus:
+        applied = bus.reader(APPLIED)
+
+        def put(twist):
+            bus._session.put(f"{robot.name}/cmd_vel", encode(twist), priority=zenoh.Priority.REAL_TIME)
+            newest = applied.newest()
+            return None if newest is None else newest.message
+
+        wait_for(lambda: (got := put(STOP)) is not None and got.reason is Reason.OK)
+        wait_for(lambda: put(GO).twist == GO)
+
+
+def test_a_replayed_or_future_command_moves_nothing():
+    with served(real_time_null()) as robot, remote(robot) as client:
+        wait_for(lambda: client.drive(Command(STOP, client.now())).reason is Reason.OK)
+        forger = client.bus.publisher(CMD_VEL)
+        now_s = client.now()
+        for time_s in (now_s - 10.0, now_s + 3600.0, now_s - 0.26):
+            forger.put(GO, time_s)
+        wait_for(lambda: sum(robot.governed.refused.values()) >= 3)
+        assert is_still(robot)
+        assert robot.inner.state().x_m == 0.0
+
+
+def test_nobody_there_is_said_with_the_remedy():
+    bus = Bus("nobody", connect=new_endpoint())
+    try:
+        robot = RemoteRobot(bus, answer_s=0.2)
+        with pytest.raises(BusError, match="not open"):
+            robot.read()
+        with pytest.raises(BusError, match="no robot named 'nobody'.*lira twin"):
+            robot.open()
+        robot.close()
+    finally:
+        bus.close()
+
+
+def test_the_profile_comes_over_the_bus():
+    with served(real_time_null()) as robot, remote(robot) as client:
+        assert client.profile == PROFILE

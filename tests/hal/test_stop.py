@@ -1,0 +1,96 @@
+"""Law 1 with real processes: kill the driver, and the wheels stand within the budget; end the server, and they stand."""
+
+import signal
+import subprocess
+import sys
+
+import pytest
+from wiring import new_endpoint, new_name, wait_for
+
+from hal.bus import Bus
+from hal.messages import STOP, Command, Reason, Twist
+from hal.profile import STOP_BUDGET_S
+from hal.remote import RemoteRobot
+from hal.topics import APPLIED
+from tools.bench import null_robot
+from tools.processes import ChildProcess
+
+DRIVER = """
+import sys
+from hal.bus import Bus
+from hal.messages import STOP, Command, Twist
+from hal.remote import RemoteRobot
+robot = RemoteRobot(Bus(sys.argv[1], connect=sys.argv[2]))
+robot.open()
+for step in range(1000):
+    robot.drive(Command(STOP if step < 3 else Twist(0.5, 0.0), robot.now(), answers=robot.read().seq))
+    robot.wait(robot.now() + robot.profile.period_s)
+"""
+
+
+@pytest.fixture
+def address():
+    return new_name(), new_endpoint()
+
+
+@pytest.fixture
+def server(address, tmp_path):
+    command = [sys.executable, "-P", "-m", "tools.bench.null_robot", *address]
+    with ChildProcess("the robot", command, tmp_path / "robot.log") as process:
+        process.wait_ready(null_robot.READY, 30.0)
+        yield process
+
+
+@pytest.fixture
+def bus(address, server):
+    bus = Bus(address[0], connect=address[1])
+    yield bus
+    assert bus.close()
+
+
+@pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGSTOP])
+def test_a_driver_that_dies_stops_the_wheels_in_time(address, bus, number):
+    reader = bus.reader(APPLIED, depth=256)
+    driver = subprocess.Popen([sys.executable, "-c", DRIVER, *address])
+    try:
+        wait_for(lambda: any(r.message.twist.linear_m_s > 0 for r in reader.poll()), 20.0)
+        driver.send_signal(number)
+        seen = []
+        wait_for(lambda: seen.extend(r.message for r in reader.poll()) or (bool(seen) and seen[-1].twist == STOP))
+    finally:
+        driver.kill()
+        driver.wait()
+    still = next(applied for applied in seen if applied.twist == STOP)
+    moving = [applied for applied in seen if applied.twist != STOP]
+    assert still.reason is Reason.STALE
+    if moving:
+        last_command_s = max(applied.stamp_s - applied.command_age_s for applied in moving)
+        assert still.stamp_s - last_command_s <= STOP_BUDGET_S + 0.05
+    # Nothing moves it but a neutral command, and then it goes on.
+    robot = RemoteRobot(bus)
+    robot.open()
+    go = Twist(0.25, 0.0)
+    wait_for(lambda: robot.drive(Command(go, robot.now())).reason is Reason.NEUTRAL_FIRST)
+    wait_for(lambda: robot.drive(Command(STOP, robot.now())).reason is Reason.OK)
+    wait_for(lambda: robot.drive(Command(go, robot.now())).twist == go)
+    robot.close()
+
+
+def test_sigterm_stops_the_wheels_and_ends_the_server(address, server, bus):
+    robot = RemoteRobot(bus)
+    robot.open()
+    wait_for(lambda: robot.drive(Command(STOP, robot.now())).reason is Reason.OK)
+    wait_for(lambda: robot.drive(Command(Twist(0.5, 0.0), robot.now())).twist != STOP)
+    server._process.send_signal(signal.SIGTERM)
+    assert server.wait(10.0) == 0
+    robot.close()
+
+
+def test_a_second_server_of_the_same_name_is_refused_and_the_first_goes_on(address, server, bus):
+    again = [sys.executable, "-P", "-m", "tools.bench.null_robot", address[0], new_endpoint()]
+    done = subprocess.run(again, capture_output=True, text=True, timeout=30, check=False)
+    assert done.returncode != 0
+    assert "already runs" in done.stderr
+    robot = RemoteRobot(bus)
+    robot.open()
+    robot.close()

@@ -1,0 +1,96 @@
+"""Robots on buses of their own, for tests."""
+
+import threading
+import time
+import uuid
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+
+from hal.bus import Bus
+from hal.governed import GovernedRobot
+from hal.null import NullRobot
+from hal.profile import load_profile
+from hal.remote import RemoteRobot
+from hal.server import HalServer
+from tools.processes import free_port
+
+PROFILE = load_profile("thesis-sim")
+
+
+def new_name() -> str:
+    return f"t{uuid.uuid4().hex}"
+
+
+def new_endpoint() -> str:
+    return f"127.0.0.1:{free_port()}"
+
+
+def real_time_null(kind: type[NullRobot] = NullRobot) -> NullRobot:
+    return kind(PROFILE, time.monotonic, time.sleep)
+
+
+class Served:
+    """A robot that is served from a thread; `failure` is what the server ended with."""
+
+    def __init__(self, inner: NullRobot, *, lockstep: bool = False) -> None:
+        self.inner = inner
+        self.name, self.endpoint = new_name(), new_endpoint()
+        self.stop, self.is_ready = threading.Event(), threading.Event()
+        self.failure: BaseException | None = None
+        self.governed = GovernedRobot(inner)
+        self._bus = Bus(self.name, listen=self.endpoint)
+        self._server = HalServer(self.governed, self._bus, inner, lockstep=lockstep, ready=self.is_ready.set)
+        self._thread = threading.Thread(target=self._run)
+        self._thread.start()
+
+    def _run(self) -> None:
+        try:
+            self._server.run(self.stop)
+        except BaseException as error:  # noqa: BLE001 - the test looks at it
+            self.failure = error
+
+    def end(self) -> None:
+        self.stop.set()
+        self.join()
+        assert self._bus.close()
+
+    def join(self) -> None:
+        self._thread.join(10.0)
+        assert not self._thread.is_alive()
+
+
+@contextmanager
+def served(inner: NullRobot, *, lockstep: bool = False) -> Iterator[Served]:
+    robot = Served(inner, lockstep=lockstep)
+    try:
+        wait_for(lambda: robot.is_ready.is_set() or robot.failure is not None, 10.0)
+        yield robot
+    finally:
+        robot.end()
+
+
+@contextmanager
+def joined(robot: Served) -> Iterator[Bus]:
+    bus = Bus(robot.name, connect=robot.endpoint)
+    try:
+        yield bus
+    finally:
+        assert bus.close()
+
+
+@contextmanager
+def remote(robot: Served) -> Iterator[RemoteRobot]:
+    with joined(robot) as bus:
+        client = RemoteRobot(bus)
+        client.open()
+        try:
+            yield client
+        finally:
+            client.close()
+
+
+def wait_for(condition: Callable[[], bool], timeout_s: float = 5.0) -> None:
+    deadline_s = time.monotonic() + timeout_s
+    while not condition():
+        assert time.monotonic() < deadline_s, "never happened"
+        time.sleep(0.005)
