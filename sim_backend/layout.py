@@ -13,7 +13,8 @@ DRAWN_STEP_M = 0.02
 # Nothing random stands nearer than this to the start, nothing at all nearer than a robot's size.
 CLEAR_OF_START_M = 2.0
 ROBOT_M = 0.3
-ATTEMPTS = 200
+ATTEMPTS = 400
+TRIES_PER_X = 40
 
 
 @dataclass(frozen=True, slots=True)
@@ -141,8 +142,9 @@ def scatter_area(
     """Throw boxes until `count` stand free of each other, denser towards the far end."""
     blocks: list[Block] = []
     for _ in range(area.count):
-        for _ in range(ATTEMPTS):
-            x = area.x_m[0] + (area.x_m[1] - area.x_m[0]) * ramp(rng.uniform(), area.sparse)
+        for attempt in range(ATTEMPTS):
+            if attempt % TRIES_PER_X == 0:  # or crowded places would lose their boxes to empty ones
+                x = area.x_m[0] + (area.x_m[1] - area.x_m[0]) * ramp(rng.uniform(), area.sparse)
             y = rng.uniform(*area.y_m)
             half_m = area.size_m / 2
             clear_of_start = math.hypot(x - start[0], y - start[1]) > CLEAR_OF_START_M + half_m

@@ -149,7 +149,7 @@ def test_the_forest_grows_denser_and_leaves_gaps_and_the_start_free():
         for index, block in enumerate(blocks):
             for other in blocks[:index]:
                 assert math.hypot(block.x_m - other.x_m, block.y_m - other.y_m) > 0.45 + 0.7
-    assert counts[1] > 1.5 * counts[0]
+    assert counts[1] > 2.0 * counts[0]
 
 
 def test_lines_can_be_followed_at_one_metre_and_one_radian_a_second():
