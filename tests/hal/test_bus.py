@@ -1,5 +1,7 @@
 """The bus: what is put comes, the newest wins, garbage is counted, nobody and trouble are said."""
 
+import threading
+
 import pytest
 import zenoh
 from wiring import new_endpoint, new_name, wait_for
@@ -91,8 +93,6 @@ def test_questions_are_answered_refused_or_missed(pair):
     poll = robot.questions("info")
 
     def serve(reply):
-        import threading
-
         def work():
             found = []
             wait_for(lambda: bool(found) or ((q := poll()) is not None and not found.append(q)))
