@@ -13,8 +13,13 @@ from msgspec import Meta
 
 from hal.config import Table, load_toml
 from hal.errors import ConfigError
-from hal.profile import Count, NotNegative, Positive
 
+# Whatever is beyond a kilometre is a slip of the unit, or not a number.
+Metres = Annotated[float, Meta(ge=-1000.0, le=1000.0)]
+Size = Annotated[float, Meta(gt=0.0, le=1000.0)]
+Gap = Annotated[float, Meta(ge=0.0, le=1000.0)]
+Degrees = Annotated[float, Meta(ge=-360.0, le=360.0)]
+Few = Annotated[int, Meta(ge=1, le=1000)]
 Gray = Annotated[int, Meta(ge=0, le=255)]
 Share = Annotated[float, Meta(ge=0.0, le=1.0)]
 
@@ -26,17 +31,17 @@ CLOSING_DEG = 1.0
 class Start(Table, frozen=True):
     """Where the robot starts and where the line begins."""
 
-    x_m: float = 0.0
-    y_m: float = 0.0
-    yaw_deg: float = 0.0
+    x_m: Metres = 0.0
+    y_m: Metres = 0.0
+    yaw_deg: Degrees = 0.0
 
 
 class Piece(Table, frozen=True):
     """A straight (`straight_m`) or an arc (`radius_m` and `angle_deg`, positive to the left)."""
 
-    straight_m: Positive | None = None
-    radius_m: Positive | None = None
-    angle_deg: Annotated[float, Meta(ge=-360.0, le=360.0)] | None = None
+    straight_m: Size | None = None
+    radius_m: Size | None = None
+    angle_deg: Degrees | None = None
 
     def __post_init__(self) -> None:
         """Accept exactly one of the two kinds."""
@@ -59,21 +64,21 @@ class Line(Table, frozen=True):
     """A line painted on the floor, beginning at `start`. `pieces` are laid end to end, `repeat` times."""
 
     pieces: Annotated[tuple[Piece, ...], Meta(min_length=1)]
-    repeat: Count = 1
+    repeat: Few = 1
     closed: bool = False
-    width_m: Positive = 0.1
+    width_m: Size = 0.1
     gray: Gray = 0
 
 
 class Box(Table, frozen=True):
     """A box standing on the floor."""
 
-    x_m: float
-    y_m: float
-    yaw_deg: float = 0.0
-    length_m: Positive = 0.45
-    width_m: Positive = 0.45
-    height_m: Positive = 0.45
+    x_m: Metres
+    y_m: Metres
+    yaw_deg: Degrees = 0.0
+    length_m: Size = 0.45
+    width_m: Size = 0.45
+    height_m: Size = 0.45
     gray: Gray = 0
 
 
@@ -85,13 +90,13 @@ class Along(Table, frozen=True):
     line's end, which is the same place).
     """
 
-    count: Count
-    spacing_m: Positive = 4.0
-    clear_m: NotNegative = 4.0
+    count: Few
+    spacing_m: Size = 4.0
+    clear_m: Gap = 4.0
     on: Share = 1.0
-    on_lateral_m: NotNegative = 0.0
-    beside_m: tuple[Positive, Positive] = (0.5, 1.0)
-    size_m: Positive = 0.45
+    on_lateral_m: Gap = 0.0
+    beside_m: tuple[Size, Size] = (0.5, 1.0)
+    size_m: Size = 0.45
     gray: Gray = 0
 
     def __post_init__(self) -> None:
@@ -107,12 +112,12 @@ class Area(Table, frozen=True):
     the mean up to its mirror (1: even, 0: empty at the near end).
     """
 
-    count: Count
-    x_m: tuple[float, float]
-    y_m: tuple[float, float]
-    gap_m: NotNegative = 0.8
+    count: Few
+    x_m: tuple[Metres, Metres]
+    y_m: tuple[Metres, Metres]
+    gap_m: Gap = 0.8
     sparse: Share = 1.0
-    size_m: Positive = 0.45
+    size_m: Size = 0.45
     gray: Gray = 0
 
     def __post_init__(self) -> None:
@@ -129,9 +134,9 @@ class Limits(Table, frozen=True):
     along an open one. Without a line both are measured from the straight ahead of the start.
     """
 
-    lost_m: Positive
-    laps: Count = 1
-    finish_m: Positive | None = None
+    lost_m: Size
+    laps: Few = 1
+    finish_m: Size | None = None
 
 
 class World(Table, frozen=True):

@@ -1,8 +1,11 @@
 import math
+import re
+from pathlib import Path
 
 import numpy as np
 import pytest
 
+import sim_backend
 from hal.errors import ConfigError
 from sim_backend.layout import build, distance_m
 from sim_backend.world import known_worlds, load_world
@@ -55,6 +58,12 @@ def test_a_users_world_is_loaded_by_its_path(tmp_path):
     assert build(world).curve.length_m == pytest.approx(8.0 + 4.0 * math.pi, abs=1e-3)
 
 
+def test_the_world_in_the_readme_loads(tmp_path):
+    readme = Path(sim_backend.__file__).with_name("README.md").read_text(encoding="utf-8")
+    (text,) = re.findall(r"```toml\n(.*?)```", readme, re.DOTALL)
+    assert len(build(load_world(write(tmp_path, text))).blocks) == 4
+
+
 def test_an_unknown_world_names_the_known_ones():
     with pytest.raises(ConfigError, match=r"unknown world 'nosuch'.*eight.*race"):
         load_world("nosuch")
@@ -81,6 +90,11 @@ def test_a_missing_file_is_named():
         ("[limits]", "[[along]]\ncount = 2\nbeside_m = [1.0, 0.5]\n[limits]", "nearest, farthest"),
         ("[limits]", "[[box]]\nx_m = 0.3\ny_m = 0.0\n[limits]", "box 1 at .* stands on the start"),
         ("lost_m = 1.0", "lost_m = nan", "lost_m"),
+        ("straight_m = 4.0 }, {", "straight_m = inf }, {", "line.pieces"),
+        ("straight_m = 4.0 }, {", "straight_m = 4000.0 }, {", "<= 1000"),
+        ("[limits]", "[[box]]\nx_m = nan\ny_m = 0.0\n[limits]", "box"),
+        ("[limits]", "[[box]]\nx_m = '2'\ny_m = 0.0\n[limits]", "Expected `float`.*box"),
+        ("[limits]", "[[box]]\nx_m = 2.0\n[limits]", "missing required field `y_m`"),
         ("[line]", "[line", "not valid TOML"),
     ],
 )
