@@ -1,7 +1,6 @@
 """One HAL server per robot name and machine."""
 
 import fcntl
-import os
 import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -16,21 +15,21 @@ def only_instance(robot: str) -> Iterator[None]:
 
     Raises `BusError` if another process holds it.
     """
-    path = Path(os.environ.get("XDG_RUNTIME_DIR") or tempfile.gettempdir()) / f"lira-{robot}.lock"
-    taken = BusError(
-        f"a robot named '{robot}' already runs on this machine ({path} is locked)",
-        "Stop it, or give this one another name.",
-    )
+    path = Path(tempfile.gettempdir()) / f"lira-{robot}.lock"
     try:
-        descriptor = os.open(path, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o600)
+        # Only read, and made only if it is missing: then another user's left-over does no harm.
+        if not path.exists():
+            path.touch(mode=0o644)
+        lock = path.open("rb")
     except OSError as error:
-        raise taken from error
-    try:
-        fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
-    except BlockingIOError:
-        os.close(descriptor)
-        raise taken from None
-    try:
+        remedy = "Remove it, or set TMPDIR to a folder of yours."
+        raise BusError(f"cannot open {path}: {error.strerror}", remedy) from error
+    with lock:
+        try:
+            fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError:
+            raise BusError(
+                f"a robot named '{robot}' already runs on this machine ({path} is locked)",
+                "Stop it, or give this one another name.",
+            ) from None
         yield
-    finally:
-        os.close(descriptor)

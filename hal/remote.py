@@ -67,8 +67,8 @@ class RemoteRobot:
     def drive(self, command: Command) -> Applied:
         """Send a command.
 
-        In lockstep policy's command returns what was applied in its step. In real time, and for teleop, what the robot
-        last said that it applied.
+        In lockstep policy's command returns what was applied in its step, and teleop's at once. In real time either
+        waits a moment for what was applied on it, and returns what was applied last if that does not come.
         """
         return self.link.drive(command)
 

@@ -19,7 +19,8 @@ from hal.topics import APPLIED, CMD_VEL, SIM_STATE, TELEOP
 
 REPEAT_HZ = 20.0
 DECISION_S = 0.5  # age at which a decision is no longer sent
-POLL_S = 0.005
+ANSWER_S = 0.05
+POLL_S = 0.002
 NAP_S = 0.02
 HEAR_S = 5.0
 MOMENT_S = 0.5
@@ -39,7 +40,8 @@ class RealTimeLink:
         self._newest: Applied | None = None
         self._held: dict[Source, Command] = {}
         self._repeat_s = 0.0
-        self._lock = threading.Lock()  # over the clock, the held decisions and the order of what is sent
+        # Over the clock, the held decisions, the order of what is sent, and what came back.
+        self._heard = threading.Condition()
         self._stop = threading.Event()
         self._thread = threading.Thread(target=self._run, name="remote-robot", daemon=True)
 
@@ -63,7 +65,7 @@ class RealTimeLink:
 
     def now(self) -> float:
         """Seconds on the robot's clock, as estimated."""
-        with self._lock:
+        with self._heard:
             return self._clock.now(time.monotonic())
 
     def read(self) -> Observation:
@@ -78,15 +80,19 @@ class RealTimeLink:
         return state
 
     def drive(self, command: Command) -> Applied:
-        """Send a command; returns what the robot last said it applied, stopped if it has not said so lately."""
+        """Send a command and wait a moment for what the robot says it applied on it.
+
+        Returns what it said last if that does not come in time, a stop if it has not said anything lately.
+        """
         decided = command.source is Source.POLICY or command.answers >= 0
-        with self._lock:
+        with self._heard:
             now_s = self._clock.now(time.monotonic())
             if decided:
                 self._held[command.source] = command
                 self._send_held(now_s, command)
             else:
                 _put(self._publishers[command.source], command, command.stamp_s)
+            self._heard.wait_for(lambda: _results_from(self._newest, command, now_s), ANSWER_S)
             newest = self._newest
         if newest is None or now_s - newest.stamp_s > APPLIED.max_age_s:
             return Applied(STOP, now_s)
@@ -119,16 +125,17 @@ class RealTimeLink:
             attachment = received.attachment
             if attachment is None:
                 continue
-            with self._lock:
+            with self._heard:
                 if attachment.epoch != self._epoch:
                     self._epoch = attachment.epoch
                     self._clock.restart()
                     self._repeat_s = 0.0
                 self._clock.note(attachment.time_s, received.arrived_s)
                 self._newest = received.message
+                self._heard.notify_all()
 
     def _repeat(self) -> None:
-        with self._lock:
+        with self._heard:
             if not self._clock.known or (now_s := self._clock.now(time.monotonic())) < self._repeat_s:
                 return
             self._repeat_s = now_s + 1.0 / REPEAT_HZ
@@ -147,6 +154,17 @@ def _has_all(before: Observation, after: Observation) -> bool:
     """Whether every sensor that spoke before speaks again."""
     pairs = ((before.scan, after.scan), (before.image, after.image), (before.odom, after.odom))
     return all(new is not None for old, new in pairs if old is not None)
+
+
+def _results_from(applied: Applied | None, command: Command, sent_s: float) -> bool:
+    """Whether this was applied after the command came: the command itself, a hand that overruled it, or a stop."""
+    if applied is None or applied.stamp_s < sent_s:
+        return False
+    return (
+        applied.source is not Source.POLICY
+        or command.source is not Source.POLICY
+        or (applied.answers == command.answers)
+    )
 
 
 def _put(publisher: Publisher[Twist], command: Command, time_s: float) -> None:

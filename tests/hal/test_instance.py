@@ -1,0 +1,42 @@
+"""One robot of a name on a machine."""
+
+import subprocess
+import sys
+import tempfile
+
+import pytest
+from wiring import new_name
+
+from hal.errors import BusError
+from hal.instance import only_instance
+
+HOLDER = """
+import sys, time
+from hal.instance import only_instance
+with only_instance(sys.argv[1]):
+    print("held", flush=True)
+    time.sleep(60)
+"""
+
+
+def test_a_name_is_held_once_and_let_go_even_by_a_killed_process():
+    name = new_name()
+    holder = subprocess.Popen([sys.executable, "-c", HOLDER, name], stdout=subprocess.PIPE, text=True)
+    try:
+        assert holder.stdout.readline() == "held\n"
+        with pytest.raises(BusError, match=f"'{name}' already runs"), only_instance(name):
+            pass
+        with only_instance(new_name()):
+            pass
+    finally:
+        holder.kill()
+        holder.wait()
+        holder.stdout.close()
+    with only_instance(name):
+        pass
+
+
+def test_a_folder_that_takes_no_file_is_said(monkeypatch, tmp_path):
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path / "missing"))
+    with pytest.raises(BusError, match="TMPDIR"), only_instance(new_name()):
+        pass
