@@ -56,7 +56,7 @@ class PinholeCamera:
 
     def render(self, x_m: float, y_m: float, yaw_rad: float) -> ByteArray:
         """Picture from a robot at this pose, gray like everything in a world: uint8 [height, width]."""
-        _, _, pixels, depth, _ = self.scene.bullet.getCameraImage(**self.request(x_m, y_m, yaw_rad))
+        pixels, depth = self.scene.photograph(self.request(x_m, y_m, yaw_rad))
         picture: ByteArray = np.where(depth < 1.0, pixels[..., 0], self._background)
         if self._average:
             size = (self._camera.width_px, self._camera.height_px)

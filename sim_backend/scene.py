@@ -11,17 +11,23 @@ import math
 import os
 import sys
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
+from functools import partial
 from pathlib import Path
 from types import ModuleType
+from typing import TypeVar
 
 import numpy as np
 
 from hal.errors import MissingExtraError
+from hal.messages import ByteArray, FloatArray
 from sim_backend.layout import Block, Layout
 from sim_backend.polyline import Floats, Polyline
 from sim_backend.world import Line
+
+T = TypeVar("T")
 
 PAINT_STEP_M = 0.3
 
@@ -73,12 +79,35 @@ class Scene:
         self.bullet = import_pybullet()
         self.client: int = self.bullet.connect(self.bullet.DIRECT)
         self.sky_gray, self.ground_gray = layout.world.sky_gray, layout.world.ground_gray
+        # OpenGL draws into whatever belongs to the calling thread: each scene that uses it has a thread of its own.
+        self._painter = ThreadPoolExecutor(1, "egl") if egl else None
         # Before the first shape: the plugin learns of shapes as they are made.
-        self.egl = egl and self._load_egl()
+        self.egl = egl and self._paint(self._load_egl)
         self.arrange(layout)
 
     def arrange(self, layout: Layout) -> None:
         """Build everything anew from a layout: cheap, and nothing is left of the last one."""
+        self._paint(partial(self._build, layout))
+
+    def photograph(self, request: dict[str, object]) -> tuple[ByteArray, FloatArray]:
+        """Call pybullet's `getCameraImage`: pixels [height, width, 4] and depth [height, width], 1 where nothing is."""
+        _, _, pixels, depth, _ = self._paint(partial(self.bullet.getCameraImage, **request))
+        return pixels, depth
+
+    def close(self) -> None:
+        """Let go of the client. May be called twice."""
+        if self.client >= 0:
+            with quiet():
+                self._paint(partial(self.bullet.disconnect, physicsClientId=self.client))
+            self.client = -1
+        if self._painter is not None:
+            self._painter.shutdown()
+
+    def _paint(self, work: Callable[[], T]) -> T:
+        """Do what OpenGL may have a part in."""
+        return work() if self._painter is None else self._painter.submit(work).result()
+
+    def _build(self, layout: Layout) -> None:
         bullet, world = self.bullet, layout.world
         bullet.resetSimulation(physicsClientId=self.client)
         # Or pybullet keeps every mesh file it has ever read.
@@ -91,13 +120,6 @@ class Scene:
                 group = alike[first : first + GROUP]
                 self._draw(join([box_mesh(block) for block in group]), gray, self._solid(group))
         bullet.performCollisionDetection(physicsClientId=self.client)
-
-    def close(self) -> None:
-        """Let go of the client. May be called twice."""
-        if self.client >= 0:
-            with quiet():
-                self.bullet.disconnect(physicsClientId=self.client)
-            self.client = -1
 
     def _load_egl(self) -> bool:
         plugin = importlib.util.find_spec("eglRenderer")

@@ -3,6 +3,7 @@ import subprocess
 import sys
 import threading
 import time
+from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 import pytest
@@ -298,6 +299,28 @@ def test_quiet_gives_the_streams_back_after_an_error(capfd):
         1 / 0  # noqa: B018
     print("here")
     assert capfd.readouterr().out == "here\n"
+
+
+def test_with_egl_any_thread_may_look_and_two_twins_do_not_mix():
+    try:
+        pair = [Twin(SIM, "race", layout=seed, renderer="egl") for seed in (1, 2)]
+        for robot in pair:
+            robot.open()
+    except ConfigError as error:
+        pytest.skip(str(error))
+    plain = [Twin(SIM, "race", layout=seed, renderer="tiny") for seed in (1, 2)]
+    for robot in plain:
+        robot.open()
+    for _ in range(3):
+        seen = []
+        for robot in pair + plain:
+            with ThreadPoolExecutor(1) as another_thread:
+                seen.append(another_thread.submit(robot.read).result().image.data.astype(int))
+            steer(robot, 1.0)
+            robot.wait(robot.now() + 4.0)
+        assert [np.abs(seen[n] - seen[n + 2]).mean() < 0.5 for n in (0, 1)] == [True, True]
+    for robot in pair + plain:
+        robot.close()
 
 
 # Foresight

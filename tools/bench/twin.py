@@ -89,7 +89,7 @@ def bare_calls(profile: RobotProfile, twin: Twin, load: Load) -> Iterator[list[C
         pose = (state.x_m, state.y_m, state.yaw_rad)
         if seen.image is not None and seen.image.stamp_s == state.stamp_s:
             request = camera.request(*pose)
-            calls.append(lambda: bullet.getCameraImage(**request))
+            calls.append(lambda: camera.scene.photograph(request))
         if seen.scan is not None and seen.scan.stamp_s == state.stamp_s:
             rays = lidar.request(*pose)
             calls.append(lambda: bullet.rayTestBatch(**rays))
