@@ -21,8 +21,8 @@ class Teacher(Protocol):
         `policy` is what would drive from here on, None before the novice has learned anything.
         """
 
-    def reset(self) -> None:
-        """A new episode begins."""
+    def reset(self, layout: int) -> None:
+        """A new episode begins, on this layout."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -69,10 +69,14 @@ class Novice:
         keep_always = source == "human" and not self.settings.filter_human
         if not keep_always and is_redundant(action, a_n, threshold):
             return False
-        self._trainer.add(Label(features.scan, features.image, action, source))
+        self.remember(Label(features.scan, features.image, action, source))
+        return True
+
+    def remember(self, label: Label) -> None:
+        """Take in a label that an earlier session stored."""
+        self._trainer.add(label)
         self.stored += 1
         self._fresh += 1
-        return True
 
     def update(self, now_s: float) -> None:
         """Adopt weights that are ready; begin a training step if m new labels are stored. The remainder is carried."""
@@ -83,3 +87,7 @@ class Novice:
         if self._fresh >= self.settings.labels_per_step and not self._trainer.pending:
             self._fresh -= self.settings.labels_per_step
             self._trainer.start(now_s)
+
+    def close(self) -> None:
+        """End the training, in bounded time."""
+        self._trainer.close()

@@ -16,17 +16,18 @@ Style = Literal["bang-bang", "proportional"]
 # A plan is a few stages of constant steering, in steps of 0.2 s (5 Hz).
 STAGES_S = (0.4, 0.6, 0.8, 0.8)
 STEERING: dict[Style, tuple[float, ...]] = {"bang-bang": (-1.0, 0.0, 1.0), "proportional": (-1.0, -0.5, 0.0, 0.5, 1.0)}
-COMFORT_M = 0.30  # clearance below which closeness costs
+COMFORT_M = 0.40  # clearance below which closeness costs
 TOUCH_M = 0.03
 
 
 class Planner:
     """Random-free sampling planner over a fixed set of action sequences [N, T, 2]."""
 
-    def __init__(self, foresight: "Foresight", style: Style, period_s: float) -> None:
+    def __init__(self, foresight: "Foresight", style: Style, period_s: float, *, follow_line: bool) -> None:
         self._foresight = foresight
         self._period_s = period_s
         self._style = style
+        self._follow = float(follow_line)
         self._sequences = action_sequences(style, period_s)
         self._effort = np.abs(self._sequences[:, :, 1]).mean(axis=1)
         self._standing = (self._sequences[:, :, 0] < 0.5).mean(axis=1)
@@ -50,7 +51,8 @@ class Planner:
     def _cost(self, state: CourseState) -> NDArray[np.float64]:
         futures = self._foresight.imagine(state, self._sequences, self._period_s)
         steps = self._sequences.shape[1]
-        hit = futures.clearance_m < TOUCH_M
+        touch_m = min(TOUCH_M, 0.5 * max(state.clearance_m, 0.0))  # already close: look for the way out
+        hit = futures.clearance_m < touch_m
         first_hit = np.where(hit.any(axis=1), hit.argmax(axis=1), steps)
         closeness = np.clip(1.0 - futures.clearance_m / COMFORT_M, 0.0, 1.0)
         lateral = np.nan_to_num(np.abs(futures.lateral_m))
@@ -58,18 +60,18 @@ class Planner:
         cost: NDArray[np.float64] = (
             100.0 * (1.0 - first_hit / steps)
             + 3.0 * (closeness**2).mean(axis=1)
-            + 1.0 * (lateral**2).mean(axis=1)
-            + 0.5 * lateral[:, -1]
-            + 0.3 * heading
+            + self._follow * ((lateral**2).mean(axis=1) + 0.5 * lateral[:, -1] + 0.3 * heading)
             + 0.15 * self._effort
-            + 2.0 * self._standing
+            + 8.0 * self._standing
         )
         return cost
 
     def _blend(self, cost: NDArray[np.float64]) -> float:
-        """A proportional hand steers between the best plans instead of jumping from one to another."""
-        weight = np.exp(-(cost - cost.min()) / 0.05)
-        return float(np.average(self._sequences[:, 0, 1], weights=weight))
+        """A proportional hand steers between the best plans to one side instead of jumping from one to another."""
+        turns = self._sequences[:, 0, 1]
+        side = np.sign(turns[int(np.argmin(cost))])
+        weight = np.exp(-(cost - cost.min()) / 0.05) * (turns * side >= 0.0)
+        return float(np.average(turns, weights=weight))
 
 
 def action_sequences(style: Style, period_s: float) -> NDArray[np.float64]:

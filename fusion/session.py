@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import Protocol
+from typing import Literal, Protocol
 
 import numpy as np
 
@@ -32,13 +32,14 @@ class Apprentice(Method, Protocol):
 class Drive:
     """One episode and when it counts as passed.
 
-    It ends at the finish or after `limit_s`; with `to_the_end` the finish must be reached, else to be unharmed is
-    enough. `final_lateral_m` bounds how far from the line it may end.
+    It ends at the finish or after `limit_s`. `goal` is what it takes: "finish" (and never to lose the line), "leave"
+    (to get out of the world, on whichever side) or "stay" (to hit nothing). `final_lateral_m` bounds how far from the
+    line it may end.
     """
 
     episode: Episode
     limit_s: float
-    to_the_end: bool = True
+    goal: Literal["finish", "leave", "stay"] = "finish"
     final_lateral_m: float = float("inf")
 
 
@@ -69,10 +70,12 @@ class Session:
         self._journal = journal
         self._apprentice = apprentice
         self._began_s = robot.now()
+        self._laps = 0
 
     def teach(self, drives: Sequence[Drive], teacher: Teacher, laps: int) -> bool:
         """Train until the novice passes a proving run on the same drives. False if `laps` were not enough."""
         for lap in range(1, laps + 1):
+            self._laps = lap
             self._lap(self._apprentice, drives, "train", lap, teacher)
             if self._apprentice.novice.trained and self._alone(drives, "prove", lap).passed:
                 return True
@@ -82,12 +85,12 @@ class Session:
         """Let the frozen novice drive, each drive a lap of its own; after a crash it goes on behind it."""
         return [self._alone([drive], "unseen", lap) for lap, drive in enumerate(drives, start=1)]
 
-    def result(self, converged: bool, laps: int) -> ResultRecord:
+    def result(self, converged: bool) -> ResultRecord:
         """Sum the session up."""
         ledger = self._journal.ledger
         return ResultRecord(
             converged=converged,
-            laps=laps,
+            laps=self._laps,
             human_labels=ledger.labels.stored_human,
             demonstration=ledger.labels.demonstration,
             interventions=ledger.interventions,
@@ -148,21 +151,24 @@ class Session:
             state = self._arena.state()
             if np.isfinite(state.lateral_m):
                 tally.lateral_m.append(state.lateral_m)
+            if state.lost and drive.goal != "finish":
+                break
             if state.collided or state.lost:
                 tally.collisions += state.collided
                 tally.lost += state.lost
                 if phase == "prove":
                     return
                 self._begin(_after_crash(drive.episode, state, phase), method, teacher)
-        tally.unfinished += drive.to_the_end and not state.finished
-        tally.unfinished += abs(np.nan_to_num(state.lateral_m)) > drive.final_lateral_m
+        out = state.finished or (drive.goal == "leave" and state.lost)
+        tally.unfinished += drive.goal != "stay" and not out
+        tally.unfinished += bool(abs(np.nan_to_num(state.lateral_m)) > drive.final_lateral_m)
 
     def _begin(self, episode: Episode, method: Method, teacher: Teacher | None) -> None:
         self._arena.reset(episode)
         self._journal.ledger.new_episode()
         method.reset()
         if teacher is not None:
-            teacher.reset()
+            teacher.reset(episode.layout)
 
     def _step(self, method: Method, teacher: Teacher | None) -> Step:
         for _ in range(LOST_OBSERVATIONS):

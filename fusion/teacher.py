@@ -13,7 +13,7 @@ from msgspec import Meta
 from numpy.typing import NDArray
 
 from fusion.method import STAND, Call, Policy, Proposal
-from fusion.planner import Planner
+from fusion.planner import COMFORT_M, Planner
 from fusion.preprocess import Preprocessor
 from hal.config import Table
 from hal.messages import Action, CourseState, Observation
@@ -25,13 +25,24 @@ Share = Annotated[float, Meta(ge=0.0, le=1.0)]
 class Futures(Protocol):
     """Imagined drives, each array [N, T]; what a world has no line for is nan."""
 
-    clearance_m: NDArray[np.float64]
-    lateral_m: NDArray[np.float64]
-    heading_error_rad: NDArray[np.float64]
+    @property
+    def clearance_m(self) -> NDArray[np.float64]:
+        """Distance to the nearest box."""
+
+    @property
+    def lateral_m(self) -> NDArray[np.float64]:
+        """Distance left of the line."""
+
+    @property
+    def heading_error_rad(self) -> NDArray[np.float64]:
+        """Yaw relative to the line."""
 
 
 class Foresight(Protocol):
     """A second twin to try things in."""
+
+    def set_layout(self, layout: int) -> None:
+        """Arrange the boxes as they stand in the episode that begins."""
 
     def rollout(
         self, state: CourseState, policy: Callable[[Observation], Action], steps: int, period_s: float
@@ -49,6 +60,8 @@ class TeacherSettings(Table, frozen=True):
     horizon_s: float = 1.5
     margin_m: float = 0.08  # closer than this to a box is danger
     lateral_m: float = 1.0  # further than this from the line is danger
+    follow_line: bool = True  # False: only the boxes matter, and to go straight on where there is none
+    wander_rad: float = 0.1  # a larger turn within the horizon, without a box in the way, is wrong then
     safe_steps: int = 3
     delay_s: float = 0.6  # median of the log-normal reaction delay
     called_delay_s: float = 0.35
@@ -72,12 +85,16 @@ class ScriptedTeacher:
         self._period_s = profile.period_s
         self._steps = math.ceil(settings.horizon_s / profile.period_s)
         self._preprocess = Preprocessor(profile)
-        self._planner = Planner(foresight, settings.style, profile.period_s)
+        self._planner = Planner(foresight, settings.style, profile.period_s, follow_line=settings.follow_line)
         self._random = np.random.default_rng(seed)
-        self.reset()
+        self._hands_off()
 
-    def reset(self) -> None:
-        """A new episode: hands off, nothing seen yet."""
+    def reset(self, layout: int) -> None:
+        """A new episode: a look at the layout, hands off, nothing seen yet."""
+        self._foresight.set_layout(layout)
+        self._hands_off()
+
+    def _hands_off(self) -> None:
         self._driving = False
         self._react_at_s: float | None = None  # when a danger that was seen will be answered
         self._safe = 0
@@ -101,10 +118,23 @@ class ScriptedTeacher:
 
     def _danger(self, state: CourseState, policy: Policy) -> bool:
         """Whether the policy would hit something or lose the line within the horizon, at its full speed."""
-        if not self._within_reach(state):
+        if self._settings.follow_line and not self._within_reach(state):
             return False
         drive = self._foresight.rollout(state, self._seeing(policy), self._steps, self._period_s)
-        return any(self._bad(each.clearance_m, each.lateral_m) or each.collided or each.lost for each in drive)
+        return any(
+            each.collided
+            or each.clearance_m < self._settings.margin_m
+            or bool(self._off_line(np.asarray(each.lateral_m)).any())
+            for each in drive
+        ) or (not self._settings.follow_line and self._wanders(state, drive))
+
+    def _wanders(self, state: CourseState, drive: list[CourseState]) -> bool:
+        """Whether the policy turns although the way straight ahead is free."""
+        straight = np.zeros((1, self._steps, 2))
+        straight[:, :, 0] = 1.0
+        free = self._foresight.imagine(state, straight, self._period_s).clearance_m.min() > COMFORT_M
+        turned = math.remainder(drive[-1].yaw_rad - state.yaw_rad, math.tau)
+        return bool(free and abs(turned) > self._settings.wander_rad)
 
     def _within_reach(self, state: CourseState) -> bool:
         """Whether any steering at all could end badly. Saves looking ahead with rendered sensors where none can."""
@@ -114,11 +144,11 @@ class ScriptedTeacher:
         actions[:, :, 1] = turns[:, None]
         futures = self._foresight.imagine(state, actions, self._period_s)
         close = futures.clearance_m < self._settings.margin_m + 0.1
-        far = np.abs(futures.lateral_m) > self._settings.lateral_m
+        far = self._off_line(futures.lateral_m)
         return bool(close.any() or far.any())
 
-    def _bad(self, clearance_m: float, lateral_m: float) -> bool:
-        return clearance_m < self._settings.margin_m or abs(lateral_m) > self._settings.lateral_m
+    def _off_line(self, lateral_m: NDArray[np.float64]) -> NDArray[np.bool_]:
+        return self._settings.follow_line & (np.abs(lateral_m) > self._settings.lateral_m)
 
     def _seeing(self, policy: Policy) -> Callable[[Observation], Action]:
         def act(observation: Observation) -> Action:

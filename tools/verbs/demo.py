@@ -13,6 +13,7 @@ exit status: 0 if the robot learned to drive alone, 1 if it did not within its l
 """
 
 import argparse
+import shlex
 import signal
 import sys
 import time
@@ -57,6 +58,7 @@ def run(args: argparse.Namespace) -> int:
     twin = ["--world", args.world, "--profile", args.profile, "--listen", endpoint, "--lockstep"]
     fusion = ["--connect", endpoint, "--method", "lira", "--teacher", "scripted", "--run", str(folder)]
     fusion += ["--train-laps", str(args.laps), "--unseen", str(args.unseen)]
+    fusion += ["--as-command", shlex.join(["lira", *sys.argv[1:]])]
     return supervise(lira_command("twin", *both, *twin), lira_command("fusion", *both, *fusion), folder)
 
 

@@ -1,0 +1,201 @@
+"""The learner: reads the robot's sensors, decides five times a second, drives, and learns from whoever helps.
+
+It drives whatever robot has that name on the bus: the twin, or the real one. With --policy it only drives. With
+--method it learns: from a person with a gamepad, or, on a twin, from a scripted teacher until the novice drives a lap
+alone. What it learns goes into the --run folder: labels.lira (every label), novice.safetensors, run.jsonl.
+
+examples:
+  lira fusion --policy camera-expert                   let one expert drive
+  lira fusion --policy runs/demo-1/novice.safetensors  let a trained novice drive
+  lira fusion --method lira --run runs/mine            learn from a person
+  lira fusion --method lira --teacher scripted --run runs/taught
+"""
+
+import argparse
+import shlex
+import signal
+import sys
+from collections.abc import Callable
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from hal.errors import ConfigError
+
+if TYPE_CHECKING:
+    from fusion.hg_dagger import HgDagger
+    from fusion.lira import LiraSpf
+    from hal.messages import Decision
+    from hal.remote import RemoteRobot
+
+LABELS, RECORD, NOVICE = "labels.lira", "run.jsonl", "novice.safetensors"
+ENDPOINT = "127.0.0.1:7447"
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the arguments."""
+    add = parser.add_argument
+    add("--name", default="rosbot", help="the robot's name on the bus (default: %(default)s)")
+    add("--connect", default=ENDPOINT, metavar="HOST:PORT", help="where the robot listens (default: %(default)s)")
+    what = parser.add_mutually_exclusive_group(required=True)
+    what.add_argument("--policy", help="drive only: camera-expert, lidar-expert or a .safetensors file")
+    what.add_argument("--method", choices=("lira", "hg-dagger"), help="learn: LIRA-SPF or HG-DAgger")
+    add("--preset", choices=("hold", "thesis"), default="hold", help="LIRA-SPF's settings (default: %(default)s)")
+    add(
+        "--teacher",
+        choices=("none", "scripted", "perfect"),
+        default="none",
+        help="who helps: a person with a gamepad (none), or on a twin a script with or without a human's faults",
+    )
+    add(
+        "--train-laps", type=int, default=12, help="scripted teacher: give up after so many laps (default: %(default)s)"
+    )
+    add("--unseen", type=int, default=0, help="then drive so many unseen layouts alone (default: %(default)s)")
+    add("--layout", type=int, default=0, help="layout to learn on (default: %(default)s)")
+    add("--seed", type=int, default=0, help="seeds teacher and training (default: %(default)s)")
+    add("--run", type=Path, metavar="DIR", help="folder for what is learned (default: runs/<method>)")
+    add("--as-command", help=argparse.SUPPRESS)  # what a report shows as the command that repeats the run
+
+
+def run(args: argparse.Namespace) -> int:
+    """Drive until done or told to stop. Exit status 1 if a taught novice did not pass its proving run."""
+    import torch
+
+    from hal.bus import Bus
+    from hal.remote import RemoteRobot
+
+    torch.set_num_threads(1)  # the nets are small; and a result should not depend on the number of cores
+    signal.signal(signal.SIGTERM, signal.default_int_handler)
+    bus = Bus(args.name, connect=args.connect)
+    robot = RemoteRobot(bus)
+    try:
+        robot.open()
+        if args.policy is not None:
+            return show_policy(args, robot)
+        return learn_from_person(args, robot) if args.teacher == "none" else learn_from_script(args, robot)
+    finally:
+        robot.close()
+        bus.close()
+
+
+def show_policy(args: argparse.Namespace, robot: "RemoteRobot") -> int:
+    """Let one policy drive until Ctrl-C."""
+    from fusion.control import ControlLoop
+    from fusion.experts import load_expert
+    from fusion.journal import Journal
+    from fusion.method import Alone
+    from fusion.service import serve
+    from hal.server import stop_on_signal
+
+    expert = load_expert(args.policy, robot.profile)
+    loop = ControlLoop(robot)
+    with stop_on_signal() as stop:
+        loop.arm()
+        print(f"'{args.policy}' drives '{args.name}'; stop with Ctrl-C", flush=True)
+        serve(loop, Alone(expert.name, expert.act), Journal(publish=publisher(robot)), stop, say)
+    return 0
+
+
+def learn_from_person(args: argparse.Namespace, robot: "RemoteRobot") -> int:
+    """Learn from whoever takes the wheel with the dead-man, until Ctrl-C; then save the novice."""
+    from fusion.control import ControlLoop
+    from fusion.demonstrations import DemonstrationLog, read_demonstrations
+    from fusion.journal import Journal
+    from fusion.learner import Label
+    from fusion.record import RunWriter
+    from fusion.service import serve
+    from fusion.trainer import ProcessTrainer
+    from hal.server import stop_on_signal
+    from tools.assembly import apprentice
+
+    folder: Path = args.run or Path("runs") / args.method
+    folder.mkdir(parents=True, exist_ok=True)
+    method = apprentice(args.method, args.preset, robot.profile, args.seed, ProcessTrainer)
+    novice = method.novice
+    try:
+        with RunWriter(folder / RECORD) as record, DemonstrationLog(folder / LABELS, robot.profile) as log:
+            for old in read_demonstrations(folder / LABELS):
+                if old.stored:
+                    novice.remember(Label(old.scan, old.image, old.action, old.source))
+            journal = Journal(keep=log.append, write=record.write, publish=publisher(robot))
+            with stop_on_signal() as stop:
+                loop = ControlLoop(robot)
+                loop.arm()
+                print(f"{args.method} learns on '{args.name}' with {novice.stored} labels; hold the dead-man to drive")
+                serve(loop, method, journal, stop, say, lambda: novice.training_steps)
+    finally:
+        novice.close()
+    save(folder, method, robot, args)
+    return 0
+
+
+def learn_from_script(args: argparse.Namespace, robot: "RemoteRobot") -> int:
+    """Teach until the novice passes its proving run, then let it drive unseen layouts."""
+    import msgspec
+
+    from fusion.control import ControlLoop
+    from fusion.demonstrations import DemonstrationLog
+    from fusion.journal import Journal
+    from fusion.record import RunRecord, RunWriter
+    from fusion.session import Session
+    from fusion.trainer import ProcessTrainer
+    from hal.remote import RemoteArena
+    from sim_backend.world import World
+    from tools.assembly import apprentice, lap, teacher
+    from tools.cli import version
+
+    arena = RemoteArena(robot)
+    world = msgspec.json.decode(arena.info, type=World | None)
+    if world is None:
+        raise ConfigError("a scripted teacher needs a twin to see in", "Use --teacher none with a gamepad here.")
+    folder: Path = args.run or Path("runs") / args.method
+    if (folder / RECORD).exists():
+        raise ConfigError(f"{folder} already holds a run", "Choose another folder with --run.")
+    profile = robot.profile
+    in_step = partial(ProcessTrainer, adopt_after_s=profile.period_s)  # one period later, whatever it took
+    with RunWriter(folder / RECORD) as record, DemonstrationLog(folder / LABELS, profile) as log:
+        command = args.as_command or shlex.join(["lira", *sys.argv[1:]])
+        preset = args.preset if args.method == "lira" else ""
+        record.write(
+            RunRecord(world.name, profile.name, args.method, preset, args.layout, args.seed, command, version())
+        )
+        method = apprentice(args.method, args.preset, profile, args.seed, in_step)
+        try:
+            journal = Journal(keep=log.append, write=record.write, publish=publisher(robot))
+            loop = ControlLoop(robot, truth=arena.state)
+            session = Session(robot, arena, loop, journal, method)
+            loop.arm()
+            skill = "human" if args.teacher == "scripted" else args.teacher
+            hand = teacher(skill, profile, world, args.layout, args.seed)
+            converged = session.teach([lap(profile, world, args.layout)], hand, args.train_laps)
+            save(folder, method, robot, args)
+            session.show([lap(profile, world, args.layout + 1 + k) for k in range(args.unseen)])
+            record.write(session.result(converged))
+        finally:
+            method.novice.close()
+    return 0 if converged else 1
+
+
+def save(folder: Path, method: "LiraSpf | HgDagger", robot: "RemoteRobot", args: argparse.Namespace) -> None:
+    """Write the novice, if it has learned anything."""
+    from fusion.checkpoint import Checkpoint, save_checkpoint
+
+    if not method.novice.trained:
+        return
+    shape = robot.profile.features
+    command = args.as_command or shlex.join(["lira", *sys.argv[1:]])
+    about = Checkpoint("fusion", shape.bins, shape.filters, robot.profile.name, None, command, args.seed)
+    save_checkpoint(folder / NOVICE, method.novice.network, about)
+
+
+def publisher(robot: "RemoteRobot") -> Callable[["Decision"], None]:
+    """Return what puts decisions on the bus."""
+    from hal.topics import DECISION
+
+    topic = robot.bus.publisher(DECISION)
+    return lambda decision: topic.put(decision, robot.now())
+
+
+def say(line: str) -> None:
+    """Print a line at once."""
+    print(line, flush=True)
