@@ -1,15 +1,13 @@
 """How the scripted teacher finds its way: it tries short steering sequences in its head and takes the best one."""
 
 from itertools import product
-from typing import TYPE_CHECKING, Literal
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
+from fusion.foresight import Foresight
 from hal.messages import Action, CourseState
-
-if TYPE_CHECKING:
-    from fusion.teacher import Foresight
 
 Style = Literal["bang-bang", "proportional"]
 
@@ -23,7 +21,7 @@ TOUCH_M = 0.03
 class Planner:
     """Random-free sampling planner over a fixed set of action sequences [N, T, 2]."""
 
-    def __init__(self, foresight: "Foresight", style: Style, period_s: float, *, follow_line: bool) -> None:
+    def __init__(self, foresight: Foresight, style: Style, period_s: float, *, follow_line: bool) -> None:
         self._foresight = foresight
         self._period_s = period_s
         self._style = style

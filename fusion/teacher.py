@@ -6,12 +6,13 @@ line, and hands back once that policy has looked safe for a few steps. When call
 
 import math
 from collections.abc import Callable
-from typing import Annotated, Literal, Protocol
+from typing import Annotated, Literal
 
 import numpy as np
 from msgspec import Meta
 from numpy.typing import NDArray
 
+from fusion.foresight import Foresight
 from fusion.method import STAND, Call, Policy, Proposal
 from fusion.planner import COMFORT_M, Planner
 from fusion.preprocess import Preprocessor
@@ -20,37 +21,6 @@ from hal.messages import Action, CourseState, Observation
 from hal.profile import RobotProfile
 
 Share = Annotated[float, Meta(ge=0.0, le=1.0)]
-
-
-class Futures(Protocol):
-    """Imagined drives, each array [N, T]; what a world has no line for is nan."""
-
-    @property
-    def clearance_m(self) -> NDArray[np.float64]:
-        """Distance to the nearest box."""
-
-    @property
-    def lateral_m(self) -> NDArray[np.float64]:
-        """Distance left of the line."""
-
-    @property
-    def heading_error_rad(self) -> NDArray[np.float64]:
-        """Yaw relative to the line."""
-
-
-class Foresight(Protocol):
-    """A second twin to try things in."""
-
-    def set_layout(self, layout: int) -> None:
-        """Arrange the boxes as they stand in the episode that begins."""
-
-    def rollout(
-        self, state: CourseState, policy: Callable[[Observation], Action], steps: int, period_s: float
-    ) -> list[CourseState]:
-        """Let a policy drive from `state`, with rendered sensors; ends early at a collision or lost line."""
-
-    def imagine(self, state: CourseState, actions: NDArray[np.float64], period_s: float) -> Futures:
-        """Follow action sequences [N, T, 2] from `state`, without sensors."""
 
 
 class TeacherSettings(Table, frozen=True):
@@ -73,7 +43,7 @@ class TeacherSettings(Table, frozen=True):
 
 SKILLED = TeacherSettings()
 PERFECT = TeacherSettings(delay_s=0.0, called_delay_s=0.0, gain_sigma=0.0, wrong_direction=0.0, missed=0.0)
-TEACHERS = {"human": SKILLED, "perfect": PERFECT}
+TEACHERS = {"scripted": SKILLED, "perfect": PERFECT}
 
 
 class ScriptedTeacher:
@@ -98,7 +68,6 @@ class ScriptedTeacher:
         self._driving = False
         self._react_at_s: float | None = None  # when a danger that was seen will be answered
         self._safe = 0
-        self._driven = 0
         self._gain, self._wrong_steps = 1.0, 0
         self._planner.reset()
 

@@ -165,8 +165,7 @@ def learn_from_script(args: argparse.Namespace, robot: "RemoteRobot") -> int:
             loop = ControlLoop(robot, truth=arena.state)
             session = Session(robot, arena, loop, journal, method)
             loop.arm()
-            skill = "human" if args.teacher == "scripted" else args.teacher
-            hand = teacher(skill, profile, world, args.layout, args.seed)
+            hand = teacher(args.teacher, profile, world, args.layout, args.seed)
             converged = session.teach([lap(profile, world, args.layout)], hand, args.train_laps)
             save(folder, method, robot, args)
             session.show([lap(profile, world, args.layout + 1 + k) for k in range(args.unseen)])
