@@ -3,8 +3,9 @@
 import threading
 from dataclasses import replace
 
-from hal.governor import Governor
-from hal.messages import Applied, Command, Observation
+from hal.field import measure_clearance
+from hal.governor import Governor, State
+from hal.messages import Applied, Command, LaserScan, Observation
 from hal.port import Robot
 from hal.profile import RobotProfile
 
@@ -15,19 +16,25 @@ ROUNDING_S = 1e-9
 class GovernedRobot:
     """Implements `hal.port.Robot` around a raw one.
 
-    `drive`, `submit`, `tick` and `halt` may be called from any thread; the lock they share is never held while a
+    All but `open`, `read`, `wait` and `close` may be called from any thread; the lock they share is never held while a
     sensor is read or time passes, so a watchdog thread that calls `tick` waits for nothing but the base.
     """
 
     def __init__(self, robot: Robot) -> None:
         self._robot = robot
         self._governor = Governor(robot.profile)
+        self._scan: LaserScan | None = None  # that the field saw last
         self._lock = threading.Lock()
 
     @property
     def profile(self) -> RobotProfile:
         """The robot's profile."""
         return self._robot.profile
+
+    @property
+    def state(self) -> State:
+        """Whether motion is allowed now."""
+        return self._governor.state
 
     @property
     def refused(self) -> dict[str, int]:
@@ -39,8 +46,14 @@ class GovernedRobot:
         self._robot.open()
 
     def read(self) -> Observation:
-        """Return the newest of every sensor."""
-        return self._robot.read()
+        """Return the newest of every sensor; the protective field, if there is one, sees the scan."""
+        observation = self._robot.read()
+        scan, field = observation.scan, self.profile.field
+        if field is not None and scan is not None and scan is not self._scan:
+            clearance = measure_clearance(self.profile, field, scan)
+            with self._lock:
+                self._scan, self._governor.clearance = scan, clearance
+        return observation
 
     def now(self) -> float:
         """Seconds on the robot's clock."""
@@ -77,6 +90,18 @@ class GovernedRobot:
         """Stop now, forget every command."""
         with self._lock:
             self._governor.halt()
+            return self._actuate()
+
+    def press_estop(self) -> Applied:
+        """Stop now, until the emergency stop is released."""
+        with self._lock:
+            self._governor.press()
+            return self._actuate()
+
+    def release_estop(self) -> Applied:
+        """Let go of the emergency stop; the robot moves again after a neutral command."""
+        with self._lock:
+            self._governor.release(self._robot.now())
             return self._actuate()
 
     def close(self) -> None:

@@ -41,6 +41,8 @@ class Reason(StrEnum):
     STALE = "stale"  # the newest command is older than its time-out
     NEUTRAL_FIRST = "neutral_first"  # stopped or just started: a neutral command has to come first
     REFUSED = "refused"  # the newest command was refused (non-finite, out of order)
+    OBSTACLE = "obstacle"  # something is in the way, or the lidar does not say
+    ESTOP = "estop"  # the emergency stop is pressed
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,7 +50,8 @@ class Command:
     """A wish to move, in SI units.
 
     `stamp_s` is when it was decided, `answers` the sequence number of the observation it answers (-1: none).
-    `released` marks the teleop command that follows the release of the dead-man: the wheel goes back to the policy.
+    `released` marks the last command of a commander: the teleop command that follows the release of the dead-man (the
+    wheel goes back to the policy), or a policy's farewell. `epoch` is the commander's session and `seq` its count.
     """
 
     twist: Twist
@@ -56,11 +59,16 @@ class Command:
     source: Source = Source.POLICY
     answers: int = -1
     released: bool = False
+    epoch: int = 0
+    seq: int = -1
 
 
 @dataclass(frozen=True, slots=True)
 class Applied:
-    """What the base really got, from whom, and why (`cmd_vel/applied`)."""
+    """What the base really got, from whom, and why (`cmd_vel/applied`).
+
+    `epoch` and `seq` name the command it came from, `command_age_s` says how old that was.
+    """
 
     twist: Twist
     stamp_s: float
@@ -69,6 +77,15 @@ class Applied:
     clamps: tuple[str, ...] = ()
     answers: int = -1
     command_age_s: float = float("nan")
+    epoch: int = 0
+    seq: int = -1
+
+
+@dataclass(frozen=True, slots=True)
+class Bool:
+    """std_msgs/Bool."""
+
+    data: bool
 
 
 @dataclass(frozen=True, slots=True)

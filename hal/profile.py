@@ -4,6 +4,7 @@
 """
 
 from importlib import resources
+from itertools import pairwise
 from pathlib import Path
 from typing import Annotated, Literal
 
@@ -38,6 +39,8 @@ class Base(Table, frozen=True):
     max_linear_m_s: Positive
     max_angular_rad_s: Positive
     acceleration_m_s2: Positive  # the firmware's ramp, "wheels" only
+    max_acceleration_m_s2: Positive | None = None  # the governor's, for speeding up; none if absent
+    max_angular_acceleration_rad_s2: Positive | None = None
     effective_track_m: Positive | None = None  # "wheels" only
     odometry_track_m: Positive | None = None  # "wheels" only
 
@@ -88,11 +91,38 @@ class Features(Table, frozen=True):
 
 
 class Control(Table, frozen=True):
-    """Rates and time-outs. A command drives for `policy_timeout_s` or `teleop_timeout_s` after it was decided."""
+    """Rates and time-outs, each longer than the one before, so that the nearest to the fault strikes first.
+
+    A gamepad is silent for `pad_timeout_s` before its bridge commands zero. A command drives for `teleop_timeout_s` or
+    `policy_timeout_s` after it was decided. The base stops by itself after `robot_timeout_s` without the HAL server,
+    its firmware after `firmware_timeout_s`. A commander that is silent for `lease_s` may be replaced by another.
+    """
 
     rate_hz: Positive
     policy_timeout_s: Positive
     teleop_timeout_s: Positive
+    pad_timeout_s: Positive = 0.1
+    robot_timeout_s: Positive = STOP_BUDGET_S
+    firmware_timeout_s: Positive = 1.0
+    lease_s: Positive = 1.0
+
+
+class Field(Table, frozen=True):
+    """Protective field: how far the lidar must see free ground in front of the body, in the direction of motion.
+
+    The way is as wide as the body and `margin_m` on each side. Nearer than `slow_m` the robot goes at most at
+    `slow_m_s`, nearer than `stop_m` not at all; the other direction stays free. A scan counts for `max_age_s`.
+    """
+
+    stop_m: Positive
+    slow_m: Positive
+    slow_m_s: Positive
+    margin_m: NotNegative
+    max_age_s: Positive
+
+
+# From the hand to the wheels.
+NESTED = ("pad_timeout_s", "teleop_timeout_s", "policy_timeout_s", "robot_timeout_s", "firmware_timeout_s")
 
 
 class RobotProfile(Table, frozen=True):
@@ -105,6 +135,7 @@ class RobotProfile(Table, frozen=True):
     camera: Camera
     features: Features
     control: Control
+    field: Field | None = None
 
     def __post_init__(self) -> None:
         """Check what no single key can: raises `ValueError`, which loading turns into a `ConfigError`."""
@@ -112,6 +143,10 @@ class RobotProfile(Table, frozen=True):
             value = getattr(self.control, key)
             if value >= STOP_BUDGET_S:
                 raise ValueError(f"control.{key} = {value} must be below the stop budget of {STOP_BUDGET_S} s")
+        for shorter, longer in [*pairwise(NESTED), ("policy_timeout_s", "lease_s")]:
+            self._check_below("control", shorter, longer)
+        if self.field is not None:
+            self._check_below("field", "stop_m", "slow_m")
         if self.features.fov_rad > self.lidar.fov_rad + 1e-6:
             raise ValueError(
                 f"features.fov_rad = {self.features.fov_rad} is wider than lidar.fov_rad = {self.lidar.fov_rad}"
@@ -121,6 +156,11 @@ class RobotProfile(Table, frozen=True):
                 f"features.max_range_m = {self.features.max_range_m} is beyond "
                 f"lidar.range_max_m = {self.lidar.range_max_m}"
             )
+
+    def _check_below(self, table: str, lower: str, upper: str) -> None:
+        low, high = (getattr(getattr(self, table), key) for key in (lower, upper))
+        if low >= high:
+            raise ValueError(f"{table}.{lower} = {low} must be below {table}.{upper} = {high}")
 
     @property
     def period_s(self) -> float:

@@ -110,7 +110,7 @@ class RealTimeLink:
             self._thread.join()
             self._held.clear()
             for _ in range(FAREWELL):
-                _put(self._publishers[Source.POLICY], Command(STOP, 0.0), self.now())
+                _put(self._publishers[Source.POLICY], Command(STOP, 0.0, released=True), self.now())
 
     def _run(self) -> None:
         while not self._stop.wait(POLL_S):

@@ -17,6 +17,7 @@ from hal.messages import (
     Action,
     Applied,
     BatteryState,
+    Bool,
     Clock,
     CompressedImage,
     CourseState,
@@ -125,6 +126,8 @@ def _applied_to(m: Applied) -> Any:
         list(m.clamps),
         m.answers,
         m.command_age_s,
+        m.epoch,
+        m.seq,
     )
 
 
@@ -137,7 +140,17 @@ def _applied_from(ros: Any) -> Applied:
         tuple(ros.clamps),
         ros.answers,
         ros.command_age_s,
+        ros.epoch,
+        ros.seq,
     )
+
+
+def _bool_to(m: Bool) -> Any:
+    return _ros("std_msgs/msg/Bool")(m.data)
+
+
+def _bool_from(ros: Any) -> Bool:
+    return Bool(bool(ros.data))
 
 
 def _scan_to(m: LaserScan) -> Any:
@@ -343,6 +356,7 @@ class Codec:
 
 CODECS: dict[type, Codec] = {
     Twist: Codec("geometry_msgs/msg/Twist", _twist_to, _twist_from),
+    Bool: Codec("std_msgs/msg/Bool", _bool_to, _bool_from),
     Clock: Codec("rosgraph_msgs/msg/Clock", _clock_to, _clock_from),
     Applied: Codec("lira_msgs/msg/Applied", _applied_to, _applied_from),
     LaserScan: Codec("sensor_msgs/msg/LaserScan", _scan_to, _scan_from),

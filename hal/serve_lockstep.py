@@ -7,9 +7,11 @@ so what was put first is there first. With one seed, two runs are the same to th
 
 import threading
 import time
+from dataclasses import replace
 
 from hal.bus import Bus
 from hal.desk import Desk
+from hal.estop import EstopDesk
 from hal.governed import GovernedRobot
 from hal.inlet import Inlet
 from hal.messages import Clock, Command, Observation
@@ -31,6 +33,7 @@ class LockstepLoop:
         self._desk = desk
         self._arena = arena
         self._inlet = Inlet(bus)
+        self._estop = EstopDesk(robot, bus)
         self._outlet = Outlet(bus, robot.profile.camera, lockstep=True)
         self._applied = bus.publisher(APPLIED, LOCKSTEP)
         self._state = bus.publisher(SIM_STATE, LOCKSTEP)
@@ -63,6 +66,9 @@ class LockstepLoop:
         since_s = shown_s = time.monotonic()
         while not stop.is_set():
             self._desk.serve(self._show)
+            self._estop.serve()
+            if self._inlet.estop():
+                self._robot.press_estop()
             answer = self._answer()
             if answer is not None:
                 return answer
@@ -81,5 +87,10 @@ class LockstepLoop:
             return None
         for command in self._inlet.teleop(now_s):
             if command.answers in (-1, seq):
-                self._robot.submit(command)
-        return answers[-1]
+                self._robot.submit(_free(command))
+        return _free(answers[-1])
+
+
+def _free(command: Command) -> Command:
+    """Take a command for anybody's: time stands between two commanders, so a lease would never end."""
+    return replace(command, epoch=0)

@@ -51,6 +51,8 @@ class CommandLoop:
 
     def _obey(self) -> bool:
         """Hand new commands to the governor, the person's first. Returns whether there were any."""
+        if self._inlet.estop():
+            self._robot.press_estop()
         now_s = self._robot.now()
         commands = self._inlet.teleop(now_s) + self._inlet.policy(now_s)
         for command in commands:

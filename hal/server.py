@@ -11,6 +11,7 @@ import msgspec
 from hal.bus import Bus
 from hal.desk import LOCKSTEP, REALTIME, Desk, Info
 from hal.errors import BusError
+from hal.estop import EstopDesk
 from hal.governed import GovernedRobot
 from hal.instance import only_instance
 from hal.outlet import Outlet
@@ -99,6 +100,8 @@ class HalServer:
         commands = CommandLoop(self._robot, self._bus)
         wheels = crew.start("commands", lambda: commands.run(stop))
         crew.start("images", lambda: images.run(stop))
+        estop = EstopDesk(self._robot, self._bus)
+        crew.start("estop", lambda: estop.run(stop))
         if opened.is_set():
             self._ready()
         # The main thread does nothing, so that it hears signals even while a sensor never answers.

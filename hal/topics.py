@@ -12,6 +12,7 @@ from hal.codec import ros_type_of
 from hal.messages import (
     Applied,
     BatteryState,
+    Bool,
     Clock,
     CompressedImage,
     CourseState,
@@ -76,6 +77,7 @@ BATTERY = Topic("battery", BatteryState, 1.0, 5.0, LATCHED)
 CMD_VEL = Topic("cmd_vel", Twist, 20.0, 0.3, URGENT)
 TELEOP = Topic("cmd_vel/teleop", Twist, 30.0, 0.2, URGENT)
 APPLIED = Topic("cmd_vel/applied", Applied, 20.0, 0.3, URGENT)
+ESTOP = Topic("estop", Bool, 1.0, float("inf"), LATCHED)  # true presses; only a query releases
 DECISION = Topic("lira/decision", Decision, 5.0, 1.0, REPORT)
 SIM_STATE = Topic("sim/state", CourseState, 20.0, 0.3, SENSOR)
 CLOCK = Topic("clock", Clock, 20.0, 0.3, URGENT)  # lockstep only: closes an observation
@@ -90,6 +92,7 @@ TOPICS: tuple[Topic[Any], ...] = (
     CMD_VEL,
     TELEOP,
     APPLIED,
+    ESTOP,
     DECISION,
     SIM_STATE,
     CLOCK,
@@ -98,3 +101,4 @@ TOPICS: tuple[Topic[Any], ...] = (
 # Keys that answer queries.
 INFO = "info"
 RESET = "sim/reset"
+ESTOP_QUERY = "estop/ask"

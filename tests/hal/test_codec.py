@@ -13,6 +13,7 @@ from hal.errors import CodecError
 from hal.messages import (
     Applied,
     BatteryState,
+    Bool,
     Clock,
     CompressedImage,
     CourseState,
@@ -40,7 +41,7 @@ MESSAGES = [
     Twist(NAN, INF),
     Clock(1.25),
     Applied(Twist(0.1, 0.2), 3.5),
-    Applied(Twist(0.1, 0.2), 3.5, Source.TELEOP, Reason.OK, ("linear", "angular"), 77, 0.125),
+    Applied(Twist(0.1, 0.2), 3.5, Source.TELEOP, Reason.OK, ("linear", "angular"), 77, 0.125, 2**64 - 1, 9),
     LaserScan(2.5, -1.0, 0.25, 0.0625, 4.0, np.array([1.0, INF, -INF, NAN, 0.5], np.float32), 0.125, 0.25),
     LaserScan(2.5, -1.0, 0.25, 0.0625, 4.0, np.empty(0, np.float32)),
     Image(1.0, np.arange(24, dtype=np.uint8).reshape(2, 4, 3)),
@@ -58,6 +59,8 @@ MESSAGES = [
     Decision(
         7.25, 12, "human", "none", (0.5, -1.0), (0.25, 0.0), (0.5, -1.0), (), 0.06, LabelCounts(), 0, 0, 0, "x", 3
     ),
+    Bool(True),
+    Bool(False),
 ]
 
 

@@ -1,7 +1,9 @@
 """The governor over every state and event, its rules one by one, and properties over any sequence."""
 
 import math
+from dataclasses import replace
 
+import msgspec
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -44,33 +46,62 @@ def test_the_table_covers_every_state_and_event():
     assert set(TRANSITIONS) == {(state, event) for state in State for event in Event}
 
 
-EXPECTED = {
-    Event.NEUTRAL: ((State.ARMED, Reason.OK), (State.ARMED, Reason.OK)),
-    Event.MOTION: ((State.STOPPED, Reason.NEUTRAL_FIRST), (State.ARMED, Reason.OK)),
-    Event.EXPIRED: ((State.STOPPED, Reason.STALE), (State.STOPPED, Reason.STALE)),
-    Event.BROKEN: ((State.STOPPED, Reason.REFUSED), (State.STOPPED, Reason.REFUSED)),
-    Event.IGNORED: ((State.STOPPED, Reason.REFUSED), (State.ARMED, Reason.OK)),
-    Event.HALTED: ((State.STOPPED, Reason.NO_COMMAND), (State.STOPPED, Reason.NO_COMMAND)),
+D, A, S, E = State.DISARMED, State.ARMED, State.STOPPED, State.EMERGENCY
+EXPECTED = {  # by state: disarmed, armed, stopped, emergency
+    Event.NEUTRAL: ((A, Reason.OK), (A, Reason.OK), (A, Reason.OK), (E, Reason.ESTOP)),
+    Event.MOTION: (
+        (D, Reason.NEUTRAL_FIRST),
+        (A, Reason.OK),
+        (S, Reason.NEUTRAL_FIRST),
+        (E, Reason.ESTOP),
+    ),
+    Event.EXPIRED: ((D, Reason.STALE), (S, Reason.STALE), (S, Reason.STALE), (E, Reason.ESTOP)),
+    Event.BROKEN: ((D, Reason.REFUSED), (S, Reason.REFUSED), (S, Reason.REFUSED), (E, Reason.ESTOP)),
+    Event.IGNORED: ((D, Reason.REFUSED), (A, Reason.OK), (S, Reason.REFUSED), (E, Reason.ESTOP)),
+    Event.HALTED: ((D, Reason.NO_COMMAND), (D, Reason.NO_COMMAND), (D, Reason.NO_COMMAND), (E, Reason.ESTOP)),
+    Event.PRESSED: ((E, Reason.ESTOP),) * 4,
+    Event.RELEASED: (
+        (D, Reason.NEUTRAL_FIRST),
+        (A, Reason.OK),
+        (S, Reason.NEUTRAL_FIRST),
+        (S, Reason.NEUTRAL_FIRST),
+    ),
 }
 
 
-@pytest.mark.parametrize("event", Event)
-@pytest.mark.parametrize("armed", [False, True])
-def test_every_event_in_every_state(event, armed):
+def in_state(state):
+    """A governor that got into a state by events, with a live motion command at 10.0 where that is possible."""
     desk = Desk()
-    desk.at(0.0, policy(STOP if armed else GO, 0.0))
-    assert desk.governor.state is (State.ARMED if armed else State.STOPPED)
+    if state is S:
+        desk.armed(9.0)
+        desk.at(9.5)
+    if state is A:
+        desk.armed(10.0)
+    if state is E:
+        desk.governor.press()
+    desk.at(10.0, policy(GO, 10.0))
+    assert desk.governor.state is state
+    return desk
+
+
+@pytest.mark.parametrize("event", Event)
+@pytest.mark.parametrize("state", State)
+def test_every_event_in_every_state(event, state):
+    desk = in_state(state)
     happen = {
-        Event.NEUTRAL: lambda: desk.at(0.1, policy(STOP, 0.1)),
-        Event.MOTION: lambda: desk.at(0.1, policy(GO, 0.1)),
-        Event.EXPIRED: lambda: desk.at(1.0),
-        Event.BROKEN: lambda: desk.at(0.1, policy(Twist(math.nan, 0.0), 0.1)),
-        Event.IGNORED: lambda: desk.at(0.1, policy(GO, -1.0)),
-        Event.HALTED: lambda: (desk.governor.halt(), desk.at(0.1))[1],
+        Event.NEUTRAL: lambda: desk.at(10.1, policy(STOP, 10.1)),
+        Event.MOTION: lambda: desk.at(10.1, policy(GO, 10.1)),
+        Event.EXPIRED: lambda: desk.at(11.0),
+        Event.BROKEN: lambda: desk.at(10.1, policy(Twist(math.nan, 0.0), 10.1)),
+        Event.IGNORED: lambda: desk.at(10.1, policy(GO, 9.0)),
+        Event.HALTED: lambda: (desk.governor.halt(), desk.at(10.1))[1],
+        Event.PRESSED: lambda: (desk.governor.press(), desk.at(10.1))[1],
+        Event.RELEASED: lambda: (desk.governor.release(10.1), desk.at(10.1))[1],
     }
     applied = happen[event]()
-    assert (desk.governor.state, applied.reason) == EXPECTED[event][armed]
-    if desk.governor.state is State.STOPPED:
+    assert (desk.governor.state, applied.reason) == EXPECTED[event][list(State).index(state)]
+    assert TRANSITIONS[state, event] == (desk.governor.state, applied.reason)
+    if desk.governor.state is not A:
         assert (applied.twist, applied.source) == (STOP, Source.NONE)
 
 
@@ -230,12 +261,97 @@ def test_a_hand_that_vanishes_in_motion_does_not_hand_over_to_policy():
     assert desk.at(now_s + 0.04, policy(GO, now_s + 0.04)).twist == GO
 
 
-def test_a_hand_that_goes_silent_after_zero_hands_over_to_policy():
+@pytest.mark.parametrize("held", [TURN, STOP])
+def test_a_hand_that_vanishes_never_hands_over_to_policy_even_from_a_centred_stick(held):
     desk = Desk().armed()
-    desk.at(0.05, policy(GO, 0.05), teleop(TURN, 0.05))
-    assert desk.at(0.1, teleop(STOP, 0.1), policy(GO, 0.1)).twist == STOP
-    assert desk.at(0.1 + TELEOP_S - 0.01, policy(GO, 0.25)).twist == STOP
-    assert desk.at(0.1 + TELEOP_S).twist == GO
+    assert desk.at(0.1, teleop(held, 0.1), policy(GO, 0.1)).source is T
+    assert desk.at(0.25, policy(GO, 0.25)).twist == held
+    assert desk.at(0.1 + TELEOP_S, policy(GO, 0.3)).twist == STOP
+    assert desk.at(0.35, policy(GO, 0.35)).reason is Reason.NEUTRAL_FIRST
+
+
+def test_the_emergency_stop_holds_until_released_and_then_wants_a_new_neutral_command():
+    desk = Desk().armed()
+    assert desk.at(0.1, policy(GO, 0.1)).twist == GO
+    desk.governor.press()
+    for now_s in (0.12, 0.2, 0.3):
+        applied = desk.at(now_s, policy(STOP, now_s), teleop(STOP, now_s), policy(GO, now_s), teleop(GO, now_s))
+        assert (applied.twist, applied.reason) == (STOP, Reason.ESTOP)
+    desk.governor.release(0.35)
+    assert desk.at(0.36).reason is Reason.NEUTRAL_FIRST
+    assert desk.at(0.37, policy(STOP, 0.34)).twist == STOP  # it was sent before the release
+    assert desk.at(0.38, policy(GO, 0.38)).reason is Reason.NEUTRAL_FIRST
+    assert desk.at(0.4, policy(STOP, 0.4)).reason is Reason.OK
+    assert desk.at(0.42, policy(GO, 0.42)).twist == GO
+
+
+def by(epoch, twist, stamp_s, *, released=False, source=P):
+    return Command(twist, stamp_s, source, released=released, epoch=epoch, seq=3)
+
+
+def test_a_second_commander_is_refused_and_counted():
+    desk = Desk()
+    desk.at(0.0, by(1, STOP, 0.0))
+    assert desk.at(0.1, by(2, TURN, 0.1)).twist == STOP
+    applied = desk.at(0.12, by(1, GO, 0.12))
+    assert (applied.twist, applied.epoch, applied.seq) == (GO, 1, 3)
+    assert desk.at(0.15, by(2, TURN, 0.15)).twist == GO
+    assert desk.governor.refused == {"another commander": 2}
+
+
+def test_a_silent_commander_is_replaced_and_does_not_come_back():
+    desk = Desk()
+    desk.at(0.0, by(1, STOP, 0.0))
+    now_s = PROFILE.control.lease_s
+    assert desk.at(now_s - 0.01, by(2, STOP, now_s - 0.01)).reason is Reason.REFUSED
+    assert desk.at(now_s, by(2, STOP, now_s)).reason is Reason.OK
+    assert desk.at(now_s + 0.1, by(1, TURN, now_s + 0.1), by(2, GO, now_s + 0.1)).twist == GO
+    desk.at(now_s + 9.0, by(1, STOP, now_s + 9.0))
+    assert desk.governor.refused == {"another commander": 1, "old epoch": 2}
+
+
+def test_a_commander_that_leaves_disarms_and_makes_room_at_once():
+    desk = Desk()
+    desk.at(0.0, by(1, STOP, 0.0))
+    assert desk.at(0.1, by(1, GO, 0.1)).twist == GO
+    left = desk.at(0.15, by(1, STOP, 0.15, released=True))
+    assert (left.twist, left.reason, desk.governor.state) == (STOP, Reason.NO_COMMAND, State.DISARMED)
+    assert desk.at(0.16, by(2, GO, 0.16)).reason is Reason.NEUTRAL_FIRST
+    assert desk.at(0.17, by(2, STOP, 0.17)).reason is Reason.OK
+    # It may come back, too: it let go, nobody took the wheel from it.
+    desk.at(0.2, by(2, STOP, 0.2, released=True))
+    assert desk.at(0.25, by(1, STOP, 0.25)).reason is Reason.OK
+
+
+def test_a_policy_that_leaves_does_not_touch_the_persons_hand():
+    desk = Desk().armed()
+    assert desk.at(0.1, teleop(TURN, 0.1)).twist == TURN
+    desk.at(0.12, Command(STOP, 0.12, P, released=True))
+    assert desk.at(0.13).twist == TURN
+
+
+def with_base(**changes):
+    return msgspec.structs.replace(PROFILE, base=msgspec.structs.replace(PROFILE.base, **changes))
+
+
+def test_speeding_up_is_limited_and_slowing_down_is_not():
+    governor = Governor(with_base(max_acceleration_m_s2=1.0))
+    desk = Desk()
+    desk.governor = governor
+    desk.armed()
+    speeds = []
+    for step in range(1, 30):
+        now_s = step * 0.02
+        speeds.append(desk.at(now_s, policy(GO, now_s)).twist.linear_m_s)
+    assert speeds[0] == pytest.approx(0.02)
+    assert speeds[10] == pytest.approx(0.22)
+    assert speeds[-1] == 0.5
+    slow = desk.at(0.6, policy(Twist(0.1, 1.0), 0.6))
+    assert (slow.twist, slow.clamps) == (Twist(0.1, 1.0), ())
+    back = desk.at(0.62, policy(Twist(-0.5, 0.0), 0.62))
+    assert back.twist.linear_m_s == pytest.approx(-0.02)
+    assert back.clamps == ("acceleration",)
+    assert desk.at(2.0).twist == STOP
 
 
 def test_policy_cannot_arm_what_a_hand_keeps_in_motion():
@@ -263,8 +379,10 @@ ACTIONS = st.lists(
                 st.sampled_from([0.0, 0.0, 0.0, -0.1, -0.3, 0.05, 1.0, math.nan]),  # stamp relative to now
                 st.sampled_from(Source),
                 st.integers(-1, 9),
-                st.booleans(),
+                st.sampled_from([False, False, False, True]),
+                st.sampled_from([1, 1, 1, 2]),
             ),
+            st.sampled_from(["press", "release", "halt"]),
         ),
     ),
     max_size=40,
@@ -273,25 +391,35 @@ ACTIONS = st.lists(
 
 @settings(max_examples=300, deadline=None)
 @given(ACTIONS)
-def test_no_sequence_of_commands_breaks_a_promise(actions):
+def test_no_sequence_of_events_breaks_a_promise(actions):
     governor = Governor(PROFILE)
     now_s = 100.0
     newest_s = {P: -math.inf, T: -math.inf}  # the newest finite command that may be obeyed
-    neutral_since_stop = False
+    neutral_since_stop = pressed = False
+    commanded_s: dict[tuple[Source, int], float] = {}
     for passed_s, wish in actions:
         now_s += passed_s
-        if wish is not None:
+        if wish == "press":
+            governor.press()
+            pressed = True
+        elif wish == "release":
+            governor.release(now_s)
+            pressed = False
+        elif wish == "halt":
+            governor.halt()
+        elif wish is not None:
             stamp_s = now_s + wish.stamp_s
-            command = Command(wish.twist, stamp_s, wish.source, wish.answers, wish.released)
-            governor.submit(command, now_s)
+            governor.submit(replace(wish, stamp_s=stamp_s), now_s)
             if wish.source in newest_s and math.isfinite(stamp_s):
                 newest_s[wish.source] = max(newest_s[wish.source], min(stamp_s, now_s))
+                commanded_s[wish.source, wish.epoch] = now_s
             neutral_since_stop |= is_neutral(wish.twist) or wish.released
         applied = governor.tick(now_s)
         moving = not is_neutral(applied.twist)
         assert abs(applied.twist.linear_m_s) <= PROFILE.base.max_linear_m_s
         assert abs(applied.twist.angular_rad_s) <= PROFILE.base.max_angular_rad_s
-        if governor.state is State.STOPPED:
+        assert (governor.state is State.EMERGENCY) is pressed
+        if governor.state is not State.ARMED:
             neutral_since_stop = False
             assert not moving
             assert applied.reason is not Reason.OK
@@ -301,3 +429,5 @@ def test_no_sequence_of_commands_breaks_a_promise(actions):
             timeout_s = POLICY_S if applied.source is P else TELEOP_S
             assert 0.0 <= applied.command_age_s < timeout_s
             assert newest_s[applied.source] > now_s - timeout_s
+            # Whose command it is, commanded lately.
+            assert commanded_s[applied.source, applied.epoch] > now_s - timeout_s
