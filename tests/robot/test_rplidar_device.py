@@ -1,0 +1,219 @@
+import math
+import os
+import signal
+import subprocess
+import sys
+import time
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from hal.errors import DeviceError
+from hal.profile import load_profile
+from robot.keeper import Keeper
+from robot.rplidar import protocol
+from robot.rplidar.device import RPLidar
+from robot.settings import LidarSettings
+from sim_backend.emulators.rplidar import DENSE_MODE, EXPRESS_MODE, STANDARD_MODE, Model, RplidarUnit
+from sim_backend.emulators.wire import Wire
+
+LIDAR = load_profile("rosbot2").lidar
+SETTINGS = LidarSettings(spin_up_s=0.0)
+
+
+def room(theta_rad):
+    """A wall 1 m ahead and 2 m to the left of the robot; nothing elsewhere."""
+    bearing = -theta_rad
+    ahead, left = np.cos(bearing), np.sin(bearing)
+    ahead_m = np.where(ahead > 0.5, 1.0 / np.maximum(ahead, 0.5), 0.0)
+    return np.where(left > 0.9, 2.0 / np.maximum(left, 0.9), ahead_m)
+
+
+class Bench:
+    """A unit on a wire, and its driver."""
+
+    def __init__(self, path, model=None, settings=SETTINGS):
+        self.unit = RplidarUnit(room, model)
+        self.wire = Wire(path, self.unit)
+        self.scans = []
+        self.driver = RPLidar(str(path), LIDAR, settings, self.scans.append)
+        self.keeper = Keeper("lidar", self.driver.session)
+
+    def __enter__(self):
+        self.keeper.start()
+        return self
+
+    def __exit__(self, *_):
+        self.keeper.close()
+        time.sleep(0.05)  # the last words are still on the wire
+        self.wire.close()
+
+    def wait_scans(self, count, timeout_s=5.0):
+        until_s, count = time.monotonic() + timeout_s, len(self.scans) + count
+        while len(self.scans) < count:
+            assert time.monotonic() < until_s, self.keeper.failure
+            time.sleep(0.01)
+        return self.scans[-1]
+
+
+def at(scan, degrees):
+    return scan.ranges[round((math.radians(degrees) - scan.angle_min) / scan.angle_increment) % len(scan.ranges)]
+
+
+def around(scan, degrees, within=3):
+    return np.nanmedian([at(scan, degrees + offset) for offset in range(-within, within + 1)])
+
+
+MODELS = {
+    "standard, old firmware": (Model(firmware=(1, 20), modes=(STANDARD_MODE,)), "EXPRESS"),
+    "express by table": (Model(), "EXPRESS"),
+    "dense": (Model(modes=(STANDARD_MODE, EXPRESS_MODE, DENSE_MODE)), "DENSE"),
+    "standard only": (Model(modes=(STANDARD_MODE,)), "STANDARD"),
+    "256000 baud": (Model(baud=256000), "EXPRESS"),
+}
+
+
+@pytest.mark.parametrize("name", MODELS)
+def test_it_scans_at_the_right_speed_in_the_best_mode(tmp_path, name):
+    model, mode = MODELS[name]
+    with Bench(tmp_path / "lidar", model) as bench:
+        scan = bench.wait_scans(2)
+        assert bench.driver.mode.answer.name == mode
+        assert bench.driver.info.firmware == model.firmware
+        assert around(scan, 0) == pytest.approx(1.0, abs=0.02)
+        assert around(scan, 90) == pytest.approx(2.0, abs=0.03)
+        assert around(scan, 40) == pytest.approx(1.0 / math.cos(math.radians(40)), abs=0.05)
+        assert np.isnan([at(scan, degrees) for degrees in (180, -120, 140)]).all()
+        assert scan.scan_time == pytest.approx(0.1, abs=0.02)
+        assert scan.time_increment < 0.0
+        assert 0.0 <= time.monotonic() - scan.stamp_s < 0.5
+        assert bench.driver.counts.lost_bytes == 0
+    assert not bench.unit.scanning
+    assert bench.unit.pwm == 0
+
+
+def test_the_mounting_turns_and_mirrors(tmp_path):
+    with Bench(tmp_path / "turned", settings=LidarSettings(spin_up_s=0.0, yaw_offset_deg=180.0)) as bench:
+        scan = bench.wait_scans(1)
+        assert around(scan, 180) == pytest.approx(1.0, abs=0.02)
+        assert around(scan, -90) == pytest.approx(2.0, abs=0.03)
+    with Bench(tmp_path / "mirrored", settings=LidarSettings(spin_up_s=0.0, mirror=True)) as bench:
+        scan = bench.wait_scans(1)
+        assert around(scan, 0) == pytest.approx(1.0, abs=0.02)
+        assert around(scan, -90) == pytest.approx(2.0, abs=0.03)
+        assert scan.time_increment > 0.0
+
+
+def test_a_left_over_stream_does_not_disturb_the_start(tmp_path):
+    bench = Bench(tmp_path / "lidar")
+    bench.unit.receive(protocol.encode_motor(660) + protocol.encode_request(0x20), time.monotonic())
+    time.sleep(0.1)
+    with bench:
+        assert around(bench.wait_scans(1), 0) == pytest.approx(1.0, abs=0.02)
+
+
+def test_an_error_is_reset_once(tmp_path):
+    bench = Bench(tmp_path / "lidar")
+    bench.unit.failed = True
+    with bench:
+        bench.wait_scans(1, 8.0)
+
+
+def test_a_broken_unit_is_refused_with_its_code(tmp_path):
+    with Bench(tmp_path / "lidar", Model(broken=True)) as bench:
+        with pytest.raises(DeviceError, match="reports error 0x8008") as refused:
+            bench.keeper.wait_alive(5.0)
+        assert "turn freely" in refused.value.remedy
+
+
+def test_garbage_and_loss_are_survived_and_counted(tmp_path):
+    with Bench(tmp_path / "lidar") as bench:
+        bench.wait_scans(1)
+        bench.wire.disturb(300)
+        bench.wait_scans(2)
+        bench.wire.loss = 0.002
+        bench.wait_scans(5)
+        assert bench.driver.counts.lost_bytes >= 300
+        assert np.nanmedian([at(scan, 0) for scan in bench.scans[-5:]]) == pytest.approx(1.0, abs=0.02)
+        assert bench.keeper.alive
+
+
+def test_unplugged_it_says_so_and_comes_back_by_itself(tmp_path):
+    with Bench(tmp_path / "lidar") as bench:
+        bench.wait_scans(1)
+        bench.wire.unplug()
+        until_s = time.monotonic() + 1.0
+        while bench.keeper.alive:
+            assert time.monotonic() < until_s
+            time.sleep(0.01)
+        bench.unit.mode = None
+        bench.wire.plug()
+        bench.wait_scans(1, 6.0)
+        assert bench.keeper.alive
+        assert bench.keeper.sessions == 2
+
+
+def test_a_unit_that_falls_silent_is_lost(tmp_path):
+    with Bench(tmp_path / "lidar") as bench:
+        bench.wait_scans(1)
+        bench.unit.pwm = 0
+        until_s = time.monotonic() + 2.0
+        while bench.keeper.alive:
+            assert time.monotonic() < until_s
+            time.sleep(0.01)
+        assert "fell silent" in str(bench.keeper.failure)
+
+
+def test_what_is_missing_or_no_lidar_is_named(tmp_path):
+    def failure(path):
+        keeper = Keeper("lidar", RPLidar(str(path), LIDAR, SETTINGS, lambda _: None).session)
+        keeper.start()
+        with pytest.raises(DeviceError) as failed:
+            keeper.wait_alive(10.0)
+        keeper.close()
+        return failed.value
+
+    assert "there is no" in failure(tmp_path / "nothing").what
+    (tmp_path / "file").write_text("")
+    assert "does not open" in failure(tmp_path / "file").what
+
+    class Mute:
+        baud = 115200
+
+        def receive(self, data, now_s):
+            pass
+
+        def emit(self, now_s):
+            return b""
+
+    wire = Wire(tmp_path / "mute", Mute())
+    assert "no lidar answers" in failure(tmp_path / "mute").what
+    wire.close()
+
+
+SCAN_FOR_EVER = """
+import sys, threading
+from hal.profile import load_profile
+from hal.server import stop_on_signal
+from robot.rplidar.device import RPLidar
+from robot.settings import LidarSettings
+with stop_on_signal() as stop:
+    driver = RPLidar(sys.argv[1], load_profile("rosbot2").lidar, LidarSettings(spin_up_s=0.0), lambda scan: None)
+    driver.session(stop, lambda: print("scans", flush=True))
+"""
+
+
+@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGKILL])
+def test_the_motor_stops_on_sigterm_and_a_killed_program_does_not_spoil_the_next_start(tmp_path, number):
+    bench = Bench(tmp_path / "lidar", replace(Model(), modes=(STANDARD_MODE, EXPRESS_MODE)))
+    child = subprocess.Popen([sys.executable, "-c", SCAN_FOR_EVER, str(tmp_path / "lidar")], stdout=subprocess.PIPE)
+    assert child.stdout.readline() == b"scans\n"
+    os.kill(child.pid, number)
+    child.wait(10.0)
+    child.stdout.close()
+    time.sleep(0.05)
+    assert bench.unit.scanning == (number == signal.SIGKILL)
+    assert (bench.unit.pwm > 0) == (number == signal.SIGKILL)
+    with bench:
+        assert around(bench.wait_scans(1), 0) == pytest.approx(1.0, abs=0.02)
