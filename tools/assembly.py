@@ -1,11 +1,11 @@
-"""Puts learners together from names: which networks, which experts, which method, which teacher."""
+"""Puts learners together: which networks, which experts, which method, which teacher, which lap."""
 
 from collections.abc import Callable
 
 from fusion.experts import as_expert, load_network
 from fusion.hg_dagger import HgDagger
 from fusion.learner import Learner
-from fusion.lira import PRESETS, LiraSpf
+from fusion.lira import LiraSettings, LiraSpf
 from fusion.networks import CameraNet, FusionNet, LidarNet
 from fusion.novice import LearningSettings, Novice, Trainer
 from fusion.session import Drive
@@ -21,19 +21,23 @@ PATIENCE = 4.0  # a lap may take so many times as long as at full speed
 
 
 def apprentice(
-    method: str, preset: str, profile: RobotProfile, seed: int, trainer: Callable[[Learner], Trainer]
+    lira: LiraSettings | None,
+    profile: RobotProfile,
+    seed: int,
+    trainer: Callable[[Learner], Trainer],
+    learning: LearningSettings | None = None,
 ) -> LiraSpf | HgDagger:
-    """Build a method ("lira" or "hg-dagger") around a novice whose trunks are frozen copies of the experts'."""
+    """Build LIRA-SPF, or without settings for it HG-DAgger, around a novice with the experts' frozen trunks."""
     camera, camera_file = load_network("camera-expert", profile)
     lidar, lidar_file = load_network("lidar-expert", profile)
     if not isinstance(camera, CameraNet) or not isinstance(lidar, LidarNet):
         raise ConfigError("the experts are of the wrong kind", "Train them anew: lira train-expert camera|lidar")
     network = FusionNet.from_experts(camera, lidar, seed=seed)
-    novice = Novice(network, trainer(Learner(network, seed=seed, frozen_trunks=True)), LearningSettings())
-    if method == "hg-dagger":
+    novice = Novice(network, trainer(Learner(network, seed=seed, frozen_trunks=True)), learning or LearningSettings())
+    if lira is None:
         return HgDagger(novice)
     experts = [as_expert("camera", camera, camera_file.cruise), as_expert("lidar", lidar, lidar_file.cruise)]
-    return LiraSpf(experts, novice, PRESETS[preset], profile.period_s)
+    return LiraSpf(experts, novice, lira, profile.period_s)
 
 
 def teacher(name: str, profile: RobotProfile, world: World, layout: int, seed: int) -> ScriptedTeacher:

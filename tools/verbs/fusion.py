@@ -24,7 +24,7 @@ from hal.errors import ConfigError
 
 if TYPE_CHECKING:
     from fusion.hg_dagger import HgDagger
-    from fusion.lira import LiraSpf
+    from fusion.lira import LiraSettings, LiraSpf
     from hal.messages import Decision
     from hal.remote import RemoteRobot
 
@@ -110,7 +110,7 @@ def learn_from_person(args: argparse.Namespace, robot: "RemoteRobot") -> int:
 
     folder: Path = args.run or Path("runs") / args.method
     folder.mkdir(parents=True, exist_ok=True)
-    method = apprentice(args.method, args.preset, robot.profile, args.seed, ProcessTrainer)
+    method = apprentice(lira_settings(args), robot.profile, args.seed, ProcessTrainer)
     novice = method.novice
     try:
         with RunWriter(folder / RECORD) as record, DemonstrationLog(folder / LABELS, robot.profile) as log:
@@ -159,7 +159,7 @@ def learn_from_script(args: argparse.Namespace, robot: "RemoteRobot") -> int:
         record.write(
             RunRecord(world.name, profile.name, args.method, preset, args.layout, args.seed, command, version())
         )
-        method = apprentice(args.method, args.preset, profile, args.seed, in_step)
+        method = apprentice(lira_settings(args), profile, args.seed, in_step)
         try:
             journal = Journal(keep=log.append, write=record.write, publish=publisher(robot))
             loop = ControlLoop(robot, truth=arena.state)
@@ -173,6 +173,13 @@ def learn_from_script(args: argparse.Namespace, robot: "RemoteRobot") -> int:
         finally:
             method.novice.close()
     return 0 if converged else 1
+
+
+def lira_settings(args: argparse.Namespace) -> "LiraSettings | None":
+    """Return LIRA-SPF's settings, or None for HG-DAgger."""
+    from fusion.lira import PRESETS
+
+    return PRESETS[args.preset] if args.method == "lira" else None
 
 
 def save(folder: Path, method: "LiraSpf | HgDagger", robot: "RemoteRobot", args: argparse.Namespace) -> None:
