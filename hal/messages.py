@@ -6,6 +6,7 @@ Frames and units: REP-103 (SI units, x forward, y left, yaw counter-clockwise) a
 
 from dataclasses import dataclass, field
 from enum import StrEnum
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -86,6 +87,26 @@ class Bool:
     """std_msgs/Bool."""
 
     data: bool
+
+
+@dataclass(frozen=True, slots=True)
+class Joy:
+    """sensor_msgs/Joy. `axes` in [-1, 1] with up and left positive, `buttons` 0 or 1, in the order of the mapping."""
+
+    stamp_s: float
+    axes: tuple[float, ...]
+    buttons: tuple[int, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class JoyFeedback:
+    """sensor_msgs/JoyFeedback: what a pad should do. `intensity` in [0, 1]."""
+
+    TYPE_RUMBLE: ClassVar[int] = 1
+
+    type: int
+    id: int
+    intensity: float
 
 
 @dataclass(frozen=True, slots=True)

@@ -25,6 +25,8 @@ from hal.messages import (
     ExpertView,
     Image,
     Imu,
+    Joy,
+    JoyFeedback,
     LabelCounts,
     LaserScan,
     Odometry,
@@ -151,6 +153,24 @@ def _bool_to(m: Bool) -> Any:
 
 def _bool_from(ros: Any) -> Bool:
     return Bool(bool(ros.data))
+
+
+def _joy_to(m: Joy) -> Any:
+    return _ros("sensor_msgs/msg/Joy")(
+        _header(m.stamp_s, "joy"), np.array(m.axes, np.float32), np.array(m.buttons, np.int32)
+    )
+
+
+def _joy_from(ros: Any) -> Joy:
+    return Joy(_stamp(ros), tuple(map(float, ros.axes)), tuple(map(int, ros.buttons)))
+
+
+def _feedback_to(m: JoyFeedback) -> Any:
+    return _ros("sensor_msgs/msg/JoyFeedback")(m.type, m.id, m.intensity)
+
+
+def _feedback_from(ros: Any) -> JoyFeedback:
+    return JoyFeedback(ros.type, ros.id, ros.intensity)
 
 
 def _scan_to(m: LaserScan) -> Any:
@@ -359,6 +379,8 @@ CODECS: dict[type, Codec] = {
     Bool: Codec("std_msgs/msg/Bool", _bool_to, _bool_from),
     Clock: Codec("rosgraph_msgs/msg/Clock", _clock_to, _clock_from),
     Applied: Codec("lira_msgs/msg/Applied", _applied_to, _applied_from),
+    Joy: Codec("sensor_msgs/msg/Joy", _joy_to, _joy_from),
+    JoyFeedback: Codec("sensor_msgs/msg/JoyFeedback", _feedback_to, _feedback_from),
     LaserScan: Codec("sensor_msgs/msg/LaserScan", _scan_to, _scan_from),
     Image: Codec("sensor_msgs/msg/Image", _image_to, _image_from),
     CompressedImage: Codec("sensor_msgs/msg/CompressedImage", _compressed_to, _compressed_from),

@@ -18,6 +18,8 @@ from hal.messages import (
     CourseState,
     Decision,
     Imu,
+    Joy,
+    JoyFeedback,
     LaserScan,
     Odometry,
     Range,
@@ -78,6 +80,8 @@ CMD_VEL = Topic("cmd_vel", Twist, 20.0, 0.3, URGENT)
 TELEOP = Topic("cmd_vel/teleop", Twist, 30.0, 0.2, URGENT)
 APPLIED = Topic("cmd_vel/applied", Applied, 20.0, 0.3, URGENT)
 ESTOP = Topic("estop", Bool, 1.0, float("inf"), LATCHED)  # true presses; only a query releases
+JOY = Topic("joy", Joy, 30.0, 0.2, SENSOR)
+JOY_FEEDBACK = Topic("joy/feedback", JoyFeedback, 1.0, 0.2, REPORT)
 DECISION = Topic("lira/decision", Decision, 5.0, 1.0, REPORT)
 SIM_STATE = Topic("sim/state", CourseState, 20.0, 0.3, SENSOR)
 CLOCK = Topic("clock", Clock, 20.0, 0.3, URGENT)  # lockstep only: closes an observation
@@ -93,6 +97,8 @@ TOPICS: tuple[Topic[Any], ...] = (
     TELEOP,
     APPLIED,
     ESTOP,
+    JOY,
+    JOY_FEEDBACK,
     DECISION,
     SIM_STATE,
     CLOCK,

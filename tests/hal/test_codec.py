@@ -21,6 +21,8 @@ from hal.messages import (
     ExpertView,
     Image,
     Imu,
+    Joy,
+    JoyFeedback,
     LabelCounts,
     LaserScan,
     Odometry,
@@ -60,6 +62,8 @@ MESSAGES = [
         7.25, 12, "human", "none", (0.5, -1.0), (0.25, 0.0), (0.5, -1.0), (), 0.06, LabelCounts(), 0, 0, 0, "x", 3
     ),
     Bool(True),
+    Joy(1.5, (0.5, -1.0), (1, 0, 1)),
+    JoyFeedback(JoyFeedback.TYPE_RUMBLE, 10, 0.5),
     Bool(False),
 ]
 

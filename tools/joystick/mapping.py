@@ -1,0 +1,85 @@
+"""Which control of a pad does what: a small TOML file, checked when it loads."""
+
+from importlib import resources
+from pathlib import Path
+from typing import Annotated
+
+from msgspec import Meta
+
+from hal.config import Table, load_toml
+from hal.errors import ConfigError
+from tools.joystick.codes import AXES, BUTTONS
+
+Share = Annotated[float, Meta(ge=0.0, le=1.0)]
+DEFAULT_PAD = "ps3"
+
+
+class Axis(Table, frozen=True):
+    """An axis by its kernel name; `inverted` if it reads low where the robot counts positive."""
+
+    axis: str
+    inverted: bool = False
+
+
+class Mapping(Table, frozen=True):
+    """One kind of pad. Controls go by their names in linux/input-event-codes.h; see `pads/ps3.toml` for what each does.
+
+    `freeze` says that a live pad of this kind is never silent. `axes` and `buttons` are the order of `joy`.
+    """
+
+    name: str
+    forward: Axis
+    turn: Axis
+    dead_man: str
+    turbo: str
+    estop: Annotated[tuple[str, ...], Meta(min_length=1)]
+    release: str
+    dead_zone: Annotated[float, Meta(ge=0.0, le=0.9)] = 0.12
+    expo: Share = 0.4
+    cruise: Annotated[float, Meta(gt=0.0, le=1.0)] = 0.5
+    freeze: bool = False
+    axes: tuple[str, ...] = ()
+    buttons: tuple[str, ...] = ()
+
+    def __post_init__(self) -> None:
+        """Check the names: raises `ValueError`, which loading turns into a `ConfigError`."""
+        used = [self.dead_man, self.turbo, *self.estop, self.release]
+        for name in (*used, *self.buttons):
+            if name not in BUTTONS:
+                raise ValueError(f"there is no button named {name}")
+        for name in (self.forward.axis, self.turn.axis, *self.axes):
+            if name not in AXES:
+                raise ValueError(f"there is no axis named {name}")
+        if len(set(used)) < len(used):
+            raise ValueError("dead_man, turbo, estop and release must be different buttons")
+        if self.forward.axis == self.turn.axis:
+            raise ValueError("forward and turn must be different axes")
+
+    @property
+    def needed_buttons(self) -> frozenset[int]:
+        """Codes of the buttons without which this is no pad to drive with."""
+        return frozenset(BUTTONS[name] for name in (self.dead_man, self.turbo, *self.estop, self.release))
+
+    @property
+    def needed_axes(self) -> frozenset[int]:
+        """Codes of the axes without which this is no pad to drive with."""
+        return frozenset((AXES[self.forward.axis], AXES[self.turn.axis]))
+
+
+def known_pads() -> list[str]:
+    """Names of the mappings that come with the project."""
+    folder = resources.files("tools.joystick") / "pads"
+    return sorted(entry.name.removesuffix(".toml") for entry in folder.iterdir() if entry.name.endswith(".toml"))
+
+
+def load_mapping(name_or_path: str) -> Mapping:
+    """Load a mapping by name or from a .toml file. Raises `ConfigError`."""
+    if name_or_path.endswith(".toml"):
+        return load_toml(Path(name_or_path), Mapping)
+    if name_or_path not in known_pads():
+        raise ConfigError(
+            f"unknown pad '{name_or_path}'",
+            f"Known: {', '.join(known_pads())}; or write a file of your own with: lira joystick --learn my-pad.toml",
+        )
+    with resources.as_file(resources.files("tools.joystick") / "pads" / f"{name_or_path}.toml") as path:
+        return load_toml(path, Mapping)
