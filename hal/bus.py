@@ -20,6 +20,7 @@ from zenoh.handlers import FifoChannel, RingChannel
 from hal.attachment import Attachment, parse_attachment
 from hal.codec import decode, encode
 from hal.errors import BusError, CodecError, ConfigError
+from hal.keys import Keys, keys_from_environment
 from hal.topics import Qos, Topic
 
 M = TypeVar("M")
@@ -126,16 +127,34 @@ class Bus:
     """A session of one robot's namespace: `robot` is the first part of every key.
 
     `listen` and `connect` are HOST:PORT; a robot listens, everybody else connects, and whoever connects keeps trying
-    in the background. Raises `BusError` if the port is taken, `ConfigError` for a bad name or endpoint.
+    in the background. With `keys` (default: those that LIRA_KEYS names) it is encrypted and authenticated both ways;
+    without, it listens on this machine only, unless `insecure`.
+
+    Raises `BusError` if the port is taken, `ConfigError` for a bad name, endpoint or keys.
     """
 
-    def __init__(self, robot: str = DEFAULT_ROBOT, *, listen: str | None = None, connect: str | None = None) -> None:
+    def __init__(
+        self,
+        robot: str = DEFAULT_ROBOT,
+        *,
+        listen: str | None = None,
+        connect: str | None = None,
+        keys: Keys | None = None,
+        insecure: bool = False,
+    ) -> None:
         if not re.fullmatch(r"[A-Za-z][A-Za-z0-9_]*", robot):
             raise ConfigError(f"'{robot}' is no name for a robot", "Use letters, digits and underscores, as in ROS.")
         self.robot = robot
         self.endpoint = listen or connect or ""
         self.epoch = secrets.randbits(64)
-        self._session = _open(listen, connect)
+        keys = keys or keys_from_environment()
+        self.encrypted = keys is not None
+        if listen and not (self.encrypted or insecure or _is_loopback(listen)):
+            raise ConfigError(
+                f"without keys anybody who reaches {listen} could drive the robot",
+                "Make keys with: lira keys init keys; listen on 127.0.0.1; or say --insecure.",
+            )
+        self._session = _open(robot, listen, connect, keys)
 
     def publisher(self, topic: Topic[M], qos: Qos | None = None) -> Publisher[M]:
         """Declare a publisher; `qos` replaces the table's."""
@@ -233,13 +252,13 @@ class Bus:
         return f"{self.robot}/{key}"
 
 
-def _open(listen: str | None, connect: str | None) -> zenoh.Session:
+def _open(robot: str, listen: str | None, connect: str | None, keys: Keys | None) -> zenoh.Session:
     config = zenoh.Config()
     for key, value in {
         # Both ends are peers: a client would use one link only.
         "mode": "peer",
-        "listen/endpoints": _links(listen),
-        "connect/endpoints": _links(connect),
+        "listen/endpoints": _links(listen, keys),
+        "connect/endpoints": _links(connect, keys),
         "connect/timeout_ms": 0,
         "connect/exit_on_failure": False,
         "connect/retry": {"period_init_ms": 200, "period_max_ms": 1000, "period_increase_factor": 2},
@@ -251,6 +270,7 @@ def _open(listen: str | None, connect: str | None) -> zenoh.Session:
         "transport/shared_memory/enabled": False,
         # Late readers of a latched topic are served by its time stamp.
         "timestamping/enabled": True,
+        **({} if keys is None else keys.zenoh_config(robot)),
     }.items():
         config.insert_json5(key, json.dumps(value))
     try:
@@ -266,11 +286,20 @@ def _open(listen: str | None, connect: str | None) -> zenoh.Session:
         raise BusError(f"cannot open the bus at {listen or connect}: {reason}", "Check the address.") from error
 
 
-def _links(endpoint: str | None) -> list[str]:
-    """One TCP link for what must arrive and one UDP link for what must be new (zenoh picks by reliability)."""
+def _is_loopback(endpoint: str) -> bool:
+    host = endpoint.rpartition(":")[0].strip("[]")
+    return host == "localhost" or host == "::1" or host.startswith("127.")
+
+
+def _links(endpoint: str | None, keys: Keys | None) -> list[str]:
+    """One TCP link for what must arrive and one UDP link for what must be new (zenoh picks by reliability).
+
+    With keys these are TLS, and the datagrams of QUIC.
+    """
     if endpoint is None:
         return []
     match = re.fullmatch(r"(\[[0-9a-fA-F:.]+\]|[A-Za-z0-9_.-]+):(\d{1,5})", endpoint)
     if match is None or not 0 < int(match[2]) < 65536:
         raise ConfigError(f"'{endpoint}' is no address", "Write HOST:PORT, for example 127.0.0.1:7447.")
-    return [f"tcp/{endpoint}?rel=1", f"udp/{endpoint}?rel=0"]
+    stream, datagram = ("tcp", "udp") if keys is None else ("tls", "quic")
+    return [f"{stream}/{endpoint}?rel=1", f"{datagram}/{endpoint}?rel=0"]

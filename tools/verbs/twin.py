@@ -36,6 +36,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="HOST:PORT",
         help="where drivers connect; 0.0.0.0:7447 lets other machines in (default: %(default)s, this machine only)",
     )
+    add("--insecure", action="store_true", help="let other machines in without keys (see lira keys)")
     add("--layout", type=int, default=0, help="which random layout of the world's boxes (default: %(default)s)")
     add("--seed", type=int, default=0, help="seeds the sensors' noise (default: %(default)s)")
     pace = parser.add_mutually_exclusive_group()
@@ -67,12 +68,13 @@ def run(args: argparse.Namespace) -> int:
     factor = None if args.lockstep else args.speed
     twin = Twin(profile, world, layout=args.layout, seed=args.seed, realtime_factor=factor, renderer=args.renderer)
     pace = "lockstep" if args.lockstep else "real time" if factor == 1.0 else f"{factor:g} times real time"
-    bus = Bus(args.name, listen=args.listen)
+    bus = Bus(args.name, listen=args.listen, insecure=args.insecure)
     try:
         with stop_on_signal() as stop:
 
             def ready() -> None:
                 where = f"world '{world.name}' ({profile.name}) on {args.listen}"
+                where += ", encrypted" if bus.encrypted else ", open to anybody there" if args.insecure else ""
                 print(f"twin '{args.name}' serves {where}, {pace}; stop with Ctrl-C", flush=True)
                 if not args.lockstep:  # there the driver tells how it goes
                     threading.Thread(target=report, args=(twin, bus, stop), daemon=True, name="status").start()

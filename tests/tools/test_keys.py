@@ -1,0 +1,180 @@
+"""Keys: who has none, or not the right ones, moves nothing."""
+
+import stat
+import threading
+import time
+
+import pytest
+import zenoh
+
+from hal.bus import Bus
+from hal.codec import encode
+from hal.errors import BusError, ConfigError
+from hal.estop import look_at_estop, press_estop
+from hal.governed import GovernedRobot
+from hal.keys import KEY, WRITERS, load_keys
+from hal.messages import STOP, Command, Reason, Twist
+from hal.null import NullRobot
+from hal.profile import load_profile
+from hal.remote import RemoteRobot
+from hal.server import HalServer
+from hal.topics import APPLIED, CMD_VEL
+from tools.authority import enroll, init
+from tools.cli import main
+from tools.processes import free_port
+
+GO = Twist(0.5, 0.0)
+NAME = "keyed"
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("keys") / "keys"
+    init(folder)
+    enroll(folder, "anna", drives=True)
+    enroll(folder, "guest", drives=False)
+    init(folder.parent / "others")
+    return folder
+
+
+@pytest.fixture
+def robot(folder):
+    """A robot with keys: where it listens, and itself."""
+    endpoint, stop, ready = f"127.0.0.1:{free_port()}", threading.Event(), threading.Event()
+    inner = NullRobot(load_profile("thesis-sim"), time.monotonic, time.sleep)
+    bus = Bus(NAME, listen=endpoint, keys=load_keys(folder / "robot"))
+    server = threading.Thread(target=HalServer(GovernedRobot(inner), bus, ready=ready.set).run, args=[stop])
+    server.start()
+    assert ready.wait(10.0)
+    yield endpoint, inner
+    stop.set()
+    server.join(10.0)
+    assert bus.close()
+
+
+def drive_until(client, twist, wanted):
+    deadline_s = time.monotonic() + 5.0
+    while not wanted(client.drive(Command(twist, client.now()))):
+        assert time.monotonic() < deadline_s
+
+
+@pytest.mark.parametrize("who", ["laptop", "anna"])
+def test_who_is_enrolled_drives_on_two_encrypted_links(folder, robot, who):
+    bus = Bus(NAME, connect=robot[0], keys=load_keys(folder / who))
+    client = RemoteRobot(bus)
+    client.open()
+    deadline_s = time.monotonic() + 5.0
+    while bus.links() != 2 and time.monotonic() < deadline_s:
+        time.sleep(0.05)
+    assert bus.links() == 2
+    assert sorted(str(link.dst).split("/")[0] for link in bus._session.info.links()) == ["quic", "tls"]
+    drive_until(client, STOP, lambda applied: applied.reason is Reason.OK)
+    drive_until(client, GO, lambda applied: applied.twist == GO)
+    client.close()
+    assert bus.close()
+
+
+def test_a_viewer_sees_and_stops_but_does_not_drive(folder, robot):
+    endpoint, inner = robot
+    bus = Bus(NAME, connect=endpoint, keys=load_keys(folder / "guest"))
+    try:
+        assert look_at_estop(bus).refused == {}
+        applied, forger = bus.reader(APPLIED), bus.publisher(CMD_VEL)
+        deadline_s = time.monotonic() + 5.0
+        while applied.newest() is None and time.monotonic() < deadline_s:
+            time.sleep(0.02)
+        assert applied.newest() is not None
+        for step in range(40):
+            forger.put(STOP if step < 20 else GO, inner.now())
+            time.sleep(0.02)
+        assert inner.state().x_m == 0.0
+        assert applied.newest().message.reason is Reason.NO_COMMAND
+        assert press_estop(bus).pressed
+    finally:
+        assert bus.close()
+
+
+def plain_session(endpoint, **more):
+    config = zenoh.Config()
+    for key, value in {
+        "mode": '"peer"',
+        "connect/endpoints": f'["tcp/{endpoint}", "udp/{endpoint}"]',
+        "connect/timeout_ms": "0",
+        "connect/exit_on_failure": "false",
+        "scouting/multicast/enabled": "false",
+        **more,
+    }.items():
+        config.insert_json5(key, value)
+    return zenoh.open(config)
+
+
+def test_a_plain_zenoh_put_without_a_certificate_moves_nothing(robot):
+    endpoint, inner = robot
+    session = plain_session(endpoint)
+    for step in range(40):
+        session.put(f"{NAME}/cmd_vel", encode(STOP if step < 20 else GO))
+        time.sleep(0.02)
+    assert session.info.peers_zid() == []
+    assert inner.state().x_m == 0.0
+    session.close()
+
+
+def test_a_certificate_of_another_authority_is_refused(folder, robot):
+    bus = Bus(NAME, connect=robot[0], keys=load_keys(folder.parent / "others" / "laptop"))
+    try:
+        with pytest.raises(BusError, match="answers"):
+            look_at_estop(bus, 1.0)
+        assert bus.peers() == 0
+    finally:
+        bus.close()
+
+
+def test_who_pretends_to_be_the_robot_is_not_believed(folder):
+    endpoint = f"127.0.0.1:{free_port()}"
+    impostor = Bus(NAME, listen=endpoint, keys=load_keys(folder / "anna"))
+    client = Bus(NAME, connect=endpoint, keys=load_keys(folder / "laptop"))
+    try:
+        heard, voice = client.reader(CMD_VEL), impostor.publisher(CMD_VEL)
+        for _ in range(30):
+            voice.put(GO, 0.0)
+            time.sleep(0.02)
+        assert client.peers() == 1
+        assert heard.newest() is None
+    finally:
+        client.close()
+        impostor.close()
+
+
+def test_without_keys_a_robot_listens_to_this_machine_only(folder, monkeypatch):
+    port = free_port()
+    monkeypatch.delenv("LIRA_KEYS", raising=False)
+    with pytest.raises(ConfigError, match=r"could drive the robot.*lira keys init.*--insecure"):
+        Bus(NAME, listen=f"0.0.0.0:{port}")
+    bus = Bus(NAME, listen=f"0.0.0.0:{port}", insecure=True)
+    assert not bus.encrypted
+    assert bus.close()
+    monkeypatch.setenv("LIRA_KEYS", str(folder / "robot"))
+    bus = Bus(NAME, listen=f"0.0.0.0:{port}")
+    assert bus.encrypted
+    assert bus.close()
+
+
+def test_the_verb_makes_closed_keys_and_never_writes_over(tmp_path, capsys):
+    folder = tmp_path / "keys"
+    assert main(["keys", "init", str(folder)]) == 0
+    assert main(["keys", "enroll", "bob", str(folder)]) == 0
+    for name in ("authority", "robot", "laptop", "bob"):
+        assert stat.S_IMODE((folder / name / KEY).stat().st_mode) == 0o600
+    assert (folder / "robot" / WRITERS).read_text().split() == ["laptop", "bob"]
+    assert main(["keys", "init", str(folder)]) == 2
+    assert main(["keys", "enroll", "bob", str(folder)]) == 2
+    assert main(["keys", "enroll", "../bob", str(folder)]) == 2
+    capsys.readouterr()
+    assert main(["keys", "show", str(folder)]) == 0
+    assert "729" in capsys.readouterr().out
+    (folder / "bob" / KEY).chmod(0o644)
+    with pytest.raises(ConfigError, match="chmod 600"):
+        load_keys(folder / "bob")
+    (folder / "bob" / KEY).unlink()
+    with pytest.raises(ConfigError, match=r"key.pem is missing"):
+        load_keys(folder / "bob")
