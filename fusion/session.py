@@ -72,14 +72,19 @@ class Session:
         self._began_s = robot.now()
         self._laps = 0
 
-    def teach(self, drives: Sequence[Drive], teacher: Teacher, laps: int) -> bool:
-        """Train until the novice passes a proving run on the same drives. False if `laps` were not enough."""
+    def teach(self, drives: Sequence[Drive], teacher: Teacher, laps: int, *, all_laps: bool = False) -> bool:
+        """Train until the novice passes a proving run on the same drives, or through `all_laps` whatever it can.
+
+        Returns whether the last proving run was passed; False if `laps` were not enough.
+        """
+        proven = False
         for lap in range(1, laps + 1):
             self._laps = lap
             self._lap(self._apprentice, drives, "train", lap, teacher)
-            if self._apprentice.novice.trained and self._alone(drives, "prove", lap).passed:
-                return True
-        return False
+            proven = self._apprentice.novice.trained and self._alone(drives, "prove", lap).passed
+            if proven and not all_laps:
+                break
+        return proven
 
     def show(self, drives: Sequence[Drive]) -> list[LapRecord]:
         """Let the frozen novice drive, each drive a lap of its own; after a crash it goes on behind it."""
@@ -176,8 +181,8 @@ class Session:
             if step is not None:
                 return step
         raise DeviceError(
-            f"{LOST_OBSERVATIONS} observations in a row could not be used",
-            "Check the lidar and the camera: 'refused' in the log says what was wrong.",
+            f"{LOST_OBSERVATIONS} observations in a row could not be used; the last: {self._loop.trouble}",
+            "Check the lidar and the camera.",
         )
 
 

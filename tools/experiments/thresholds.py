@@ -1,4 +1,4 @@
-"""Tables C.1 and C.2: LIRA-SPF on the figure-eight for other activation and redundancy thresholds, two laps."""
+"""Tables C.1 and C.2: LIRA-SPF on the figure-eight at 0.5 m/s, two laps, for other thresholds."""
 
 from collections.abc import Sequence
 
@@ -17,7 +17,11 @@ THESIS = {"tableC1": THESIS_C1, "tableC2": THESIS_C2}
 def trials(table: str, seeds: int) -> list[Trial]:
     """Every row of a table on every seed, in the thesis's preset and with `hold`."""
     rows = [(theta, keep, hold) for theta, keep in THESIS[table] for hold in (None, 0.2)]
-    return [Trial(_method(*row), "eight", seed, laps=2, unseen=0) for row in rows for seed in range(seeds)]
+    return [
+        Trial(_method(*row), "eight", seed, laps=2, all_laps=True, unseen=0, max_linear_m_s=0.5)
+        for row in rows
+        for seed in range(seeds)
+    ]
 
 
 def _method(theta: int, redundancy: int, hold: float | None) -> Method:

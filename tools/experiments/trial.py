@@ -49,7 +49,9 @@ class Trial(msgspec.Struct, frozen=True):
     seed: int
     teacher: str = "scripted"
     laps: int = 12
+    all_laps: bool = False  # go on after the novice has passed
     unseen: int = 3
+    max_linear_m_s: float = 1.0
 
     @property
     def file(self) -> str:
@@ -105,6 +107,8 @@ def play(trial: Trial) -> Outcome:
 
     torch.set_num_threads(1)
     profile, world = load_profile("thesis-sim"), load_world(trial.world)
+    base = msgspec.structs.replace(profile.base, max_linear_m_s=trial.max_linear_m_s)
+    profile = msgspec.structs.replace(profile, base=base)
     laps: list[LapRecord] = []
 
     def keep(record: Record) -> None:
@@ -122,7 +126,7 @@ def play(trial: Trial) -> Outcome:
         session = Session(robot, twin, loop, Journal(write=keep), method)
         loop.arm()
         hand = teacher(trial.teacher, profile, world, trial.seed, trial.seed)
-        converged = session.teach([lap(profile, world, trial.seed)], hand, trial.laps)
+        converged = session.teach([lap(profile, world, trial.seed)], hand, trial.laps, all_laps=trial.all_laps)
         session.show([lap(profile, world, UNSEEN + trial.seed * trial.unseen + k) for k in range(trial.unseen)])
         return Outcome(trial, tuple(laps), session.result(converged))
     finally:
