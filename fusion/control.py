@@ -59,6 +59,7 @@ class ControlLoop:
         self._preprocess = Preprocessor(robot.profile)
         self._taught = False  # whether the teacher held the wheel at the last step
         self.refused = 0  # observations that could not be used
+        self.trouble = ""  # what was wrong with the newest observation
 
     def arm(self) -> None:
         """Send the neutral command that a stopped robot asks for before it moves, and let one period pass."""
@@ -85,10 +86,14 @@ class ControlLoop:
 
     def _features(self, observation: Observation) -> Features | None:
         try:
-            return self._preprocess(observation)
-        except SensorError:
+            features = self._preprocess(observation)
+        except SensorError as error:
             self.refused += 1
+            self.trouble = str(error)
             return None
+        silent = [name for name, seen in (("lidar", observation.scan), ("camera", observation.image)) if seen is None]
+        self.trouble = f"nothing new from the {' and the '.join(silent)}" if silent else ""
+        return features
 
     def _driving_policy(self, method: Method, proposal: Proposal) -> Policy | None:
         driver = proposal.choice.driver

@@ -11,10 +11,14 @@ from fusion.journal import Journal
 from fusion.method import Method
 from hal.messages import Reason
 
+REARM = "press and release the dead-man, or start anew"
 STOPPED = {
-    Reason.STALE: "its commands came too late",
-    Reason.NEUTRAL_FIRST: "it waits for a neutral command",
-    Reason.REFUSED: "it refused a command",
+    Reason.NO_COMMAND: "no command reaches it; look whether it still runs",
+    Reason.STALE: f"its commands came too late; {REARM}",
+    Reason.NEUTRAL_FIRST: f"it waits for a neutral command; {REARM}",
+    Reason.REFUSED: f"it refused a command; {REARM}",
+    Reason.OBSTACLE: "something is in the way, or the lidar does not say",
+    Reason.ESTOP: f"the emergency stop is pressed; release it, then {REARM}",
 }
 
 
@@ -27,17 +31,13 @@ def serve(
     training_steps: Callable[[], int] = lambda: 0,
 ) -> None:
     """Run the control loop until `stop` is set. `say` gets a line whenever what holds the robot changes."""
-    said = ""
+    said: Reason | None = Reason.OK
     while not stop.is_set():
         step = loop.step(method)
-        if step is None:
-            line = "a sensor is stale or unusable: standing still"
-        elif step.applied.reason in STOPPED:
-            line = f"the robot stands: {STOPPED[step.applied.reason]}; press and release the dead-man, or start anew"
-        else:
-            line = ""
-        if line != said and (line or said):
-            say(line or "driving again")
-        said = line
+        reason = None if step is None else step.applied.reason
+        if reason is not said:
+            why = loop.trouble if reason is None else STOPPED.get(reason)
+            say("driving" if why is None else f"standing still: {why}")
+            said = reason
         if step is not None:
             journal.note(step, phase="train", lap=0, layout=0, training_steps=training_steps())

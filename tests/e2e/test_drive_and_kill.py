@@ -1,4 +1,4 @@
-"""Law 1 end to end: the twin in one process, a driver in another, and what becomes of the wheels when the driver dies."""
+"""Law 1 end to end: the twin in one process, a driver in another, and what the wheels do when the driver dies."""
 
 import signal
 import time

@@ -1,0 +1,142 @@
+"""The service over the bus: bad data stops the robot, is said once with its remedy, and good data makes it go on."""
+
+import threading
+import time
+import uuid
+from contextlib import contextmanager
+from dataclasses import replace
+
+import cv2
+import numpy as np
+import pytest
+
+from fusion.control import ControlLoop
+from fusion.journal import Journal
+from fusion.method import Alone
+from fusion.service import serve
+from hal.bus import Bus
+from hal.governed import GovernedRobot
+from hal.messages import STOP, CompressedImage, Reason, Twist
+from hal.null import NullRobot
+from hal.profile import load_profile
+from hal.remote import RemoteRobot
+from hal.server import HalServer
+from tools.processes import free_port
+
+PROFILE = load_profile("thesis-sim")
+JPEG = cv2.imencode(".jpg", np.full((32, 32), 128, np.uint8))[1].tobytes()
+GO = (0.5, 0.0)
+
+
+class Faulty(NullRobot):
+    """A robot whose sensors break in the way that `fault` names."""
+
+    fault = ""
+
+    def __init__(self):
+        super().__init__(PROFILE, time.monotonic, time.sleep)
+
+    def read(self):
+        seen = super().read()
+        data = JPEG[:-20] if self.fault == "truncated" else JPEG
+        seen = replace(seen, image=CompressedImage(seen.image.stamp_s, data))
+        if self.fault == "short":
+            return replace(seen, scan=replace(seen.scan, ranges=seen.scan.ranges[:50]))
+        return replace(seen, scan=None) if self.fault == "silent" else seen
+
+
+@contextmanager
+def on_the_bus(inner):
+    """Serve a robot from a thread, and open it from the other end."""
+    name, endpoint, stop = f"t{uuid.uuid4().hex}", f"127.0.0.1:{free_port()}", threading.Event()
+    robot_bus, bus = Bus(name, listen=endpoint), Bus(name, connect=endpoint)
+    server = threading.Thread(target=HalServer(GovernedRobot(inner), robot_bus, inner).run, args=[stop])
+    server.start()
+    robot = RemoteRobot(bus)
+    try:
+        robot.open()
+        yield robot
+    finally:
+        robot.close()
+        stop.set()
+        server.join(10.0)
+        assert bus.close()
+        assert robot_bus.close()
+
+
+def wait_for(condition, timeout_s=5.0):
+    deadline_s = time.monotonic() + timeout_s
+    while not condition():
+        assert time.monotonic() < deadline_s, "never happened"
+        time.sleep(0.01)
+
+
+def test_bad_data_on_the_bus_stops_the_robot_is_said_and_good_data_makes_it_go_on():
+    inner, said, stop = Faulty(), [], threading.Event()
+    with on_the_bus(inner) as robot:
+        wait_for(lambda: robot.read().scan is not None and robot.read().image is not None)
+        loop = ControlLoop(robot)
+        loop.arm()
+        words = [loop, Alone("novice", lambda features: GO), Journal(), stop, said.append]
+        service = threading.Thread(target=serve, args=words)
+        service.start()
+        try:
+            for fault, line in {
+                "short": "standing still: the scan has the wrong length: 50 beams",
+                "truncated": "standing still: a truncated jpeg image",
+                "silent": "standing still: nothing new from the lidar",
+            }.items():
+                wait_for(lambda: inner.state().linear_m_s == 0.5)
+                heard = len(said)
+                inner.fault = fault
+                wait_for(lambda: inner.state().linear_m_s == 0.0)
+                wait_for(lambda heard=heard: len(said) > heard)
+                assert said[heard].startswith(line)
+                inner.fault = ""
+                wait_for(lambda heard=heard: len(said) > heard + 1)
+                assert said[heard + 1 :] == ["driving"]
+            wait_for(lambda: inner.state().linear_m_s == 0.5)
+            assert service.is_alive()
+        finally:
+            stop.set()
+            service.join(5.0)
+
+
+class Held(NullRobot):
+    """A robot that is held for the reasons given, one a step, and stops the service after the last."""
+
+    def __init__(self, reasons, stop):
+        super().__init__(PROFILE)
+        self.reasons, self.stop = list(reasons), stop
+
+    def drive(self, command):
+        reason = self.reasons.pop(0)
+        if not self.reasons:
+            self.stop.set()
+        return replace(super().drive(command), twist=STOP, reason=reason)
+
+
+@pytest.mark.parametrize("reason", [reason for reason in Reason if reason is not Reason.OK])
+def test_whatever_holds_the_robot_is_said_once_with_what_to_do(reason):
+    stop, said = threading.Event(), []
+    robot = Held([Reason.OK, reason, reason, Reason.OK, Reason.OK], stop)
+    serve(ControlLoop(robot), Alone("novice", lambda features: GO), Journal(), stop, said.append)
+    assert [line.partition(":")[0] for line in said] == ["standing still", "driving"]
+    assert len(said[0]) > 30
+
+
+def test_every_step_is_written_down_and_counted_as_training():
+    stop, written, twists = threading.Event(), [], []
+
+    class Short(NullRobot):
+        def drive(self, command):
+            twists.append(command.twist)
+            if len(twists) == 3:
+                stop.set()
+            return super().drive(command)
+
+    journal = Journal(write=written.append)
+    serve(ControlLoop(Short(PROFILE)), Alone("camera", lambda features: GO), journal, stop, print)
+    assert twists == [Twist(0.5, 0.0)] * 3
+    assert [record.decision.driver for record in written] == ["camera"] * 3
+    assert {record.decision.phase for record in written} == {"train"}
