@@ -1,0 +1,67 @@
+"""Odometry of the CORE2: from its pose and velocity in the odom frame to body velocity and a corrected pose."""
+
+import math
+from dataclasses import dataclass
+
+from hal.messages import Odometry
+from robot.settings import BaseSettings
+
+# Nobody drives so far between two poses: the board began to count anew.
+JUMP_M = 0.3
+
+
+@dataclass(frozen=True, slots=True)
+class Pose:
+    """A pose in the plane."""
+
+    x_m: float
+    y_m: float
+    yaw_rad: float
+
+
+class Reckoner:
+    """Turns the board's poses into odometry with the robot's own calibration. The first pose is the origin."""
+
+    def __init__(self, settings: BaseSettings) -> None:
+        self._settings = settings
+        self._reported: Pose | None = None
+        self._pose = Pose(0.0, 0.0, 0.0)
+
+    def rebase(self) -> None:
+        """The board counts anew: its next pose is where the robot is."""
+        self._reported = None
+
+    def step(self, reported: Pose, velocity: tuple[float, float, float], stamp_s: float) -> Odometry:
+        """Take a pose, and the velocity (x, y in the odom frame, m/s, and yaw, rad/s) that belongs to it."""
+        before, self._reported = self._reported, reported
+        if before is not None:
+            self._advance(before, reported)
+        x_m_s, y_m_s, turn_rad_s = velocity
+        ahead_m_s = x_m_s * math.cos(reported.yaw_rad) + y_m_s * math.sin(reported.yaw_rad)
+        settings, pose = self._settings, self._pose
+        return Odometry(
+            stamp_s,
+            pose.x_m,
+            pose.y_m,
+            math.remainder(pose.yaw_rad, math.tau),
+            settings.distance_scale * (ahead_m_s - settings.spin_slip_m_rad * turn_rad_s),
+            settings.turn_scale * turn_rad_s,
+        )
+
+    def _advance(self, before: Pose, after: Pose) -> None:
+        settings = self._settings
+        east_m, north_m = after.x_m - before.x_m, after.y_m - before.y_m
+        if math.hypot(east_m, north_m) > JUMP_M:
+            return
+        turn_rad = math.remainder(after.yaw_rad - before.yaw_rad, math.tau)
+        heading_rad = before.yaw_rad + turn_rad / 2
+        ahead_m = east_m * math.cos(heading_rad) + north_m * math.sin(heading_rad)
+        ahead_m = settings.distance_scale * (ahead_m - settings.spin_slip_m_rad * turn_rad)
+        turn_rad *= settings.turn_scale
+        pose = self._pose
+        heading_rad = pose.yaw_rad + turn_rad / 2
+        self._pose = Pose(
+            pose.x_m + ahead_m * math.cos(heading_rad),
+            pose.y_m + ahead_m * math.sin(heading_rad),
+            pose.yaw_rad + turn_rad,
+        )

@@ -1,0 +1,179 @@
+import math
+import time
+
+import pytest
+
+from hal.errors import DeviceError
+from hal.messages import STOP, Odometry, Twist
+from robot.core2.device import Core2
+from robot.keeper import Keeper
+from robot.settings import BaseSettings
+from sim_backend.emulators.core2 import Core2Unit, Firmware
+from sim_backend.emulators.wire import Wire
+
+FAST = Firmware(boot_s=0.1)
+SETTINGS = BaseSettings(boot_s=0.15)
+
+
+class Bench:
+    """A board on a wire with wheels that obey at once, and its driver."""
+
+    def __init__(self, path, firmware=FAST, timeout_s=0.3):
+        self.twists = [STOP]
+        self.yaw_rad = 0.5
+        self.unit = Core2Unit(self.drive, self.measure, firmware)
+        self.wire = Wire(path, self.unit)
+        self.base = Core2(str(path), SETTINGS, timeout_s)
+        self.keeper = Keeper("base", self.base.session)
+
+    def drive(self, twist):
+        if twist != self.twists[-1]:
+            self.twists.append(twist)
+
+    def measure(self):
+        twist = self.twists[-1]
+        return Odometry(0.0, 1.0, 2.0, self.yaw_rad, twist.linear_m_s, twist.angular_rad_s)
+
+    def __enter__(self):
+        self.keeper.start()
+        self.keeper.wait_alive(8.0)
+        return self
+
+    def __exit__(self, *_):
+        self.keeper.close()
+        time.sleep(0.03)
+        self.wire.close()
+
+    def keep(self, twist, seconds):
+        until_s = time.monotonic() + seconds
+        while time.monotonic() < until_s:
+            self.base.drive(twist)
+            time.sleep(0.02)
+
+
+def wait_for(condition, timeout_s=3.0):
+    until_s = time.monotonic() + timeout_s
+    while not condition():
+        assert time.monotonic() < until_s
+        time.sleep(0.01)
+
+
+@pytest.mark.parametrize("baud", [525000, 500000, 460800])
+def test_it_finds_the_speed_and_learns_the_topics(tmp_path, baud):
+    with Bench(tmp_path / "base", Firmware(baud=baud, boot_s=0.1)) as bench:
+        assert bench.base.baud == baud
+        wait_for(lambda: bench.base.readings.battery is not None and bench.base.readings.imu is not None)
+        wait_for(lambda: bench.unit.watchdog)
+        assert bench.unit.motors
+        assert not bench.unit.crashed
+
+
+def test_it_drives_reads_and_stands_when_closed(tmp_path):
+    with Bench(tmp_path / "base") as bench:
+        bench.keep(Twist(0.2, 0.5), 0.4)
+        assert bench.twists[-1] == Twist(0.2, 0.5)
+        readings, now_s = bench.base.readings, time.monotonic()
+        assert readings.odom.linear_m_s == pytest.approx(0.2)
+        assert readings.odom.angular_rad_s == pytest.approx(0.5)
+        assert -0.001 <= now_s - readings.odom.stamp_s < 0.2
+        assert readings.imu.yaw_rad == pytest.approx(0.5)
+        assert readings.imu.lateral_m_s2 == pytest.approx(0.1)
+        assert readings.battery.voltage_v == pytest.approx(11.7)
+        assert sorted(readings.ranges) == ["range_fl", "range_fr", "range_rl", "range_rr"]
+        assert all(math.isnan(reading.range_m) for reading in readings.ranges.values())
+    assert bench.twists[-1] == STOP
+    assert not bench.unit.crashed
+
+
+def test_a_program_that_no_longer_commands_stands(tmp_path):
+    with Bench(tmp_path / "base") as bench:
+        bench.keep(Twist(0.2, 0.0), 0.2)
+        silent_s = time.monotonic()
+        wait_for(lambda: bench.twists[-1] == STOP)
+        assert time.monotonic() - silent_s < 0.6
+        sent = bench.base.counts.commands
+        time.sleep(0.5)
+        assert bench.base.counts.commands - sent >= 8  # zeros go on at 20 Hz
+
+
+def test_commands_go_out_at_once_and_only_the_newest(tmp_path):
+    with Bench(tmp_path / "base") as bench:
+        for i in range(100):
+            bench.base.drive(Twist(0.001 * i, 0.0))
+        wait_for(lambda: bench.twists[-1] == Twist(0.099, 0.0), 0.25)
+        assert len(bench.twists) < 10
+
+
+@pytest.mark.parametrize("bad", [math.nan, math.inf])
+def test_what_is_not_finite_never_leaves(tmp_path, bad):
+    base = Core2("nowhere", SETTINGS, 0.3)
+    with pytest.raises(ValueError, match="no velocity"):
+        base.drive(Twist(bad, 0.0))
+
+
+def test_motors_are_cut_and_given_back(tmp_path):
+    with Bench(tmp_path / "base") as bench:
+        bench.base.cut_motors(True)
+        wait_for(lambda: not bench.unit.motors)
+        bench.keep(Twist(0.2, 0.0), 0.2)
+        assert bench.twists[-1] == STOP
+        bench.base.cut_motors(False)
+        wait_for(lambda: bench.unit.motors)
+
+
+def test_time_is_answered_so_that_the_board_stays(tmp_path, monkeypatch):
+    monkeypatch.setattr("sim_backend.emulators.core2.ASK_TIME_S", 0.1)
+    monkeypatch.setattr("sim_backend.emulators.core2.GIVE_UP_S", 0.5)
+    with Bench(tmp_path / "base") as bench:
+        time.sleep(1.0)
+        assert bench.unit.configured
+        assert bench.base.answers
+        assert bench.base.counts.negotiations == 1
+
+
+def test_after_a_reset_of_the_board_it_negotiates_anew(tmp_path):
+    with Bench(tmp_path / "base") as bench:
+        bench.keep(Twist(0.2, 0.0), 0.2)
+        bench.unit.firmware = Firmware(boot_s=1.3)
+        bench.unit.reset()
+        wait_for(lambda: not bench.base.answers)
+        assert bench.twists[-1] == STOP
+        wait_for(lambda: bench.base.answers, 4.0)
+        wait_for(lambda: bench.unit.watchdog)
+        assert bench.base.counts.negotiations == 2
+        assert bench.keeper.sessions == 1
+        assert not bench.unit.crashed
+
+
+def test_garbage_is_counted_and_survived(tmp_path):
+    with Bench(tmp_path / "base") as bench:
+        bench.wire.disturb(400)
+        bench.wire.loss = 0.01
+        wait_for(lambda: bench.base.counts.lost_bytes >= 400)
+        bench.keep(Twist(0.1, 0.0), 0.3)
+        assert bench.twists[-1] == Twist(0.1, 0.0)
+
+
+def test_unplugged_it_says_so_and_comes_back(tmp_path):
+    with Bench(tmp_path / "base") as bench:
+        bench.wire.unplug()
+        wait_for(lambda: not bench.keeper.alive)
+        assert "was lost" in str(bench.keeper.failure) or "there is no" in str(bench.keeper.failure)
+        bench.unit.reset()
+        bench.wire.plug()
+        wait_for(lambda: bench.keeper.alive, 6.0)
+
+
+def test_another_layout_of_a_topic_is_named(tmp_path):
+    bench = Bench(tmp_path / "base", Firmware(boot_s=0.1, md5s=(("cmd_vel", "0" * 32),)))
+    with pytest.raises(DeviceError, match=r"cmd_vel.*unknown layout"):
+        bench.__enter__()
+    bench.__exit__()
+    assert not bench.unit.crashed
+
+
+def test_an_id_that_was_never_announced_crashes_the_emulated_board():
+    unit = Core2Unit(print, lambda: None, FAST)
+    unit.receive(b"", 0.0)
+    unit.receive(bytes.fromhex("fffe0000ffc80037"), 1.0)
+    assert unit.crashed
