@@ -77,7 +77,7 @@ def test_bad_data_on_the_bus_stops_the_robot_is_said_and_good_data_makes_it_go_o
         wait_for(lambda: robot.read().scan is not None and robot.read().image is not None)
         loop = ControlLoop(robot)
         loop.arm()
-        words = [loop, Alone("novice", lambda features: GO), Journal(), stop, said.append]
+        words = [loop, Alone("novice", lambda _: GO), Journal(), stop, said.append]
         service = threading.Thread(target=serve, args=words)
         service.start()
         try:
@@ -120,7 +120,7 @@ class Held(NullRobot):
 def test_whatever_holds_the_robot_is_said_once_with_what_to_do(reason):
     stop, said = threading.Event(), []
     robot = Held([Reason.OK, reason, reason, Reason.OK, Reason.OK], stop)
-    serve(ControlLoop(robot), Alone("novice", lambda features: GO), Journal(), stop, said.append)
+    serve(ControlLoop(robot), Alone("novice", lambda _: GO), Journal(), stop, said.append)
     assert [line.partition(":")[0] for line in said] == ["standing still", "driving"]
     assert len(said[0]) > 30
 
@@ -136,7 +136,7 @@ def test_every_step_is_written_down_and_counted_as_training():
             return super().drive(command)
 
     journal = Journal(write=written.append)
-    serve(ControlLoop(Short(PROFILE)), Alone("camera", lambda features: GO), journal, stop, print)
+    serve(ControlLoop(Short(PROFILE)), Alone("camera", lambda _: GO), journal, stop, print)
     assert twists == [Twist(0.5, 0.0)] * 3
     assert [record.decision.driver for record in written] == ["camera"] * 3
     assert {record.decision.phase for record in written} == {"train"}

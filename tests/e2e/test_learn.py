@@ -1,0 +1,126 @@
+"""The main job end to end on a short course of the user's own: `lira demo`, twice, with one seed."""
+
+import re
+from functools import partial
+
+import pytest
+import torch
+from safetensors.numpy import load_file
+
+from fusion.control import ControlLoop
+from fusion.demonstrations import DemonstrationLog
+from fusion.journal import Journal
+from fusion.lira import PRESETS
+from fusion.record import LapRecord, ResultRecord, RunRecord, RunWriter, StepRecord, read_run
+from fusion.session import Session
+from fusion.trainer import ProcessTrainer
+from hal.governed import GovernedRobot
+from hal.profile import load_profile
+from sim_backend.twin import Twin
+from sim_backend.world import load_world
+from tools.assembly import apprentice, lap, teacher
+from tools.processes import ChildProcess, lira_command
+
+WORLD = """
+description = "A short straight line with one box on it"
+
+[line]
+pieces = [{ straight_m = 18.0 }]
+
+[[box]]
+x_m = 6.0
+y_m = 0.0
+
+[limits]
+finish_m = 12.0
+lost_m = 1.5
+"""
+LAPS = 2
+DEMO_S = 120.0
+
+
+@pytest.fixture(scope="module")
+def world(tmp_path_factory):
+    path = tmp_path_factory.mktemp("world") / "short.toml"
+    path.write_text(WORLD)
+    return path
+
+
+@pytest.fixture(scope="module")
+def demos(world, tmp_path_factory):
+    """Two demos at the same time, so that they get in each other's way."""
+    folder = tmp_path_factory.mktemp("demos")
+    words = ["demo", "--world", str(world), "--laps", str(LAPS), "--unseen", "1", "--run"]
+    runs = [folder / name for name in ("first", "second")]
+    children = [ChildProcess(run.name, lira_command(*words, str(run)), folder / f"{run.name}.log") for run in runs]
+    try:
+        for child in children:
+            assert child.wait(DEMO_S) in (0, 1), child.output()
+    finally:
+        for child in children:
+            child.stop()
+    return dict(zip(runs, children, strict=True))
+
+
+@pytest.fixture
+def one_thread():
+    """What the service computes with; more threads add up in another order."""
+    before = torch.get_num_threads()
+    torch.set_num_threads(1)
+    yield
+    torch.set_num_threads(before)
+
+
+def without_wall_clock(path):
+    """A run record without what may differ: the time it took and the folder's name in the command."""
+    text = re.sub(rb'"elapsed_s":[^,}]*', b"", path.read_bytes())
+    return re.sub(rb'"command":"[^"]*"', b"", text)
+
+
+def test_a_demo_ends_with_a_result_a_report_and_the_matching_exit_status(demos):
+    for run, child in demos.items():
+        records = list(read_run(run / "run.jsonl"))
+        assert isinstance(records[0], RunRecord)
+        assert records[0].world == "short"
+        result = records[-1]
+        assert isinstance(result, ResultRecord)
+        assert child.status() == (0 if result.converged else 1)
+        assert 1 <= result.laps <= LAPS
+        assert result.training_steps >= 1
+        laps = [record for record in records if isinstance(record, LapRecord)]
+        assert [record.phase for record in laps[:2]] == ["train", "prove"]
+        assert laps[-1].phase == "unseen"
+        page = (run / "report.html").read_text()
+        assert "short" in page
+        assert child.output().splitlines()[-1] == f"report: {run / 'report.html'}"
+
+
+def test_one_seed_gives_one_run(demos):
+    first, second = demos
+    assert (first / "labels.lira").read_bytes() == (second / "labels.lira").read_bytes()
+    weights = [{n: w.tobytes() for n, w in load_file(run / "novice.safetensors").items()} for run in (first, second)]
+    assert weights[0] == weights[1]
+    assert without_wall_clock(first / "run.jsonl") == without_wall_clock(second / "run.jsonl")
+
+
+def test_in_process_gives_the_same_decisions_as_over_the_bus(demos, world, one_thread, tmp_path):
+    profile, floor = load_profile("thesis-sim"), load_world(str(world))
+    twin = Twin(profile, floor)
+    robot = GovernedRobot(twin)
+    robot.open()
+    method = apprentice(PRESETS["hold"], profile, 0, partial(ProcessTrainer, adopt_after_s=profile.period_s))
+    try:
+        with RunWriter(tmp_path / "run.jsonl") as record, DemonstrationLog(tmp_path / "labels.lira", profile) as log:
+            loop = ControlLoop(robot, truth=twin.state)
+            session = Session(robot, twin, loop, Journal(keep=log.append, write=record.write), method)
+            loop.arm()
+            session.teach([lap(profile, floor, 0)], teacher("scripted", profile, floor, 0, 0), LAPS)
+    finally:
+        method.novice.close()
+        robot.close()
+
+    def decisions(path):
+        steps = [record for record in read_run(path) if isinstance(record, StepRecord)]
+        return [(s.decision.driver, s.decision.executed, s.label) for s in steps if s.decision.phase != "unseen"]
+
+    assert decisions(tmp_path / "run.jsonl") == decisions(next(iter(demos)) / "run.jsonl")
