@@ -56,7 +56,7 @@ class Trial(msgspec.Struct, frozen=True):
     @property
     def file(self) -> str:
         """Name of the file that keeps its outcome."""
-        return f"{self.world}-{self.method.name}-{self.teacher}-{self.seed}.json"
+        return f"{Path(self.world).stem}-{self.method.name}-{self.teacher}-{self.seed}.json"
 
 
 class Outcome(msgspec.Struct, frozen=True):

@@ -1,0 +1,101 @@
+"""Experiments: statistics against numbers worked out by hand, and real trials on a short world."""
+
+import msgspec
+import numpy as np
+import pytest
+
+from fusion.lira import PRESETS
+from hal.errors import StorageError
+from tools.cli import main
+from tools.experiments.compare import ratios, summary
+from tools.experiments.runner import run_trials
+from tools.experiments.statistics import bootstrap, iqm, median_interval, paired_ratios
+from tools.experiments.trial import Method, Trial, run_trial
+
+SHORT = """
+description = "Ten metres of line with one box on it"
+[line]
+pieces = [{ straight_m = 16.0 }]
+[[box]]
+x_m = 8.0
+y_m = 0.1
+[limits]
+finish_m = 12.0
+lost_m = 1.5
+"""
+
+
+@pytest.fixture
+def world(tmp_path):
+    path = tmp_path / "short.toml"
+    path.write_text(SHORT)
+    return str(path)
+
+
+def short_trial(world, *, seed=0, name="lira-hold", lira=PRESETS["hold"]):
+    return Trial(Method(name, lira), world, seed, teacher="perfect", laps=1, unseen=1)
+
+
+def timeless(outcome):
+    """An outcome without what the wall clock adds."""
+    laps = [msgspec.structs.replace(lap, elapsed_s=0.0) for lap in outcome.laps]
+    return outcome.trial, laps, msgspec.structs.replace(outcome.result, elapsed_s=0.0)
+
+
+def test_interquartile_mean_leaves_out_both_ends():
+    assert iqm([100.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, -50.0]) == pytest.approx((2 + 3 + 4 + 5) / 4)
+    assert iqm([7.0]) == 7.0
+
+
+def test_the_bootstrap_interval_holds_the_true_median_about_as_often_as_it_says():
+    random = np.random.default_rng(1)
+    hits = 0
+    for _ in range(200):
+        _, low, high = median_interval(random.normal(3.0, 1.0, size=15).tolist())
+        hits += low <= 3.0 <= high
+    assert 175 <= hits <= 200
+
+
+def test_the_bootstrap_is_repeatable_and_collapses_for_equal_values():
+    values = [1.0, 5.0, 2.0, 8.0]
+    assert median_interval(values) == median_interval(values)
+    assert median_interval([2.0, 2.0, 2.0]) == (2.0, 2.0, 2.0)
+    assert bootstrap([1.0, 3.0], lambda x: x.mean(axis=1)) == (1.0, 3.0)
+
+
+def test_a_ratio_stays_finite_where_no_help_was_needed():
+    assert paired_ratios([10, 6], [5, 0]) == [2.0, 12.0]
+
+
+def test_trials_do_not_depend_on_the_number_of_workers_and_resume(world, tmp_path):
+    trials = [
+        short_trial(world),
+        short_trial(world, name="hg-dagger", lira=None),
+    ]
+    alone = run_trials(trials, tmp_path / "alone", workers=1)
+    together = run_trials(trials, tmp_path / "together", workers=2)
+    assert [timeless(each) for each in alone] == [timeless(each) for each in together]
+    assert alone[0].result.buffer > 0
+    again = run_trials(trials, tmp_path / "alone", workers=1)
+    assert again == alone  # to the wall-clock time: read, not run
+
+    rows = summary(alone)
+    assert [(row["method"], row["n"]) for row in rows] == [("lira-hold", 1), ("hg-dagger", 1)]
+    pair = {row["quantity"]: row for row in ratios(alone)}
+    expected = paired_ratios([alone[1].result.human_labels], [alone[0].result.human_labels])[0]
+    assert pair["human_labels"]["median"] == pytest.approx(expected)
+    assert pair["human_labels"]["censored"] == int(not all(each.result.converged for each in alone))
+
+
+def test_an_outcome_that_is_damaged_is_named(world, tmp_path):
+    trial = short_trial(world)
+    (tmp_path / trial.file).write_text("{")
+    with pytest.raises(StorageError, match="Delete it"):
+        run_trial(trial, tmp_path)
+
+
+def test_the_command_refuses_what_makes_no_sense(capsys):
+    assert main(["experiment", "table2", "--seeds", "0"]) == 2
+    assert "at least 1" in capsys.readouterr().err
+    with pytest.raises(SystemExit):
+        main(["experiment", "table9"])
