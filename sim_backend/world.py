@@ -4,15 +4,11 @@ Angles are in degrees in the file, because people write it by hand; everything t
 """
 
 import math
-from importlib import resources
-from pathlib import Path
 from typing import Annotated
 
-import msgspec
 from msgspec import Meta
 
-from hal.config import Table, load_toml
-from hal.errors import ConfigError
+from hal.config import Table
 
 # Whatever is beyond a kilometre is a slip of the unit, or not a number.
 Metres = Annotated[float, Meta(ge=-1000.0, le=1000.0)]
@@ -162,35 +158,3 @@ class World(Table, frozen=True):
             raise ValueError("limits.finish_m is needed unless the line is closed")
         if closed and self.limits.finish_m is not None:
             raise ValueError("limits.finish_m is for an open line; a closed one finishes after limits.laps")
-
-
-def known_worlds() -> list[str]:
-    """Names of the worlds that come with the project."""
-    folder = resources.files("sim_backend") / "worlds"
-    return sorted(entry.name.removesuffix(".toml") for entry in folder.iterdir() if entry.name.endswith(".toml"))
-
-
-def load_world(name_or_path: str) -> World:
-    """Load a world by name, or a user's own by the path of its TOML file.
-
-    Raises `ConfigError` for an unknown name, an unknown key, a value out of range, a line that does not close
-    or a box on the start.
-    """
-    # Here and not above: a layout is built from a world, and only loading looks back from one to the other.
-    from sim_backend.layout import check
-
-    if name_or_path.endswith(".toml"):
-        path = Path(name_or_path)
-    elif name_or_path in known_worlds():
-        path = Path(str(resources.files("sim_backend") / "worlds" / f"{name_or_path}.toml"))
-    else:
-        raise ConfigError(
-            f"unknown world '{name_or_path}'",
-            f"Known worlds: {', '.join(known_worlds())}; or give the path of a .toml file.",
-        )
-    world = msgspec.structs.replace(load_toml(path, World), name=path.stem)
-    try:
-        check(world)
-    except ValueError as error:
-        raise ConfigError(f"{path}: {error}", "Mend the world file.") from error
-    return world

@@ -22,9 +22,9 @@ from fusion.trainer import InlineTrainer
 from hal.governed import GovernedRobot
 from hal.messages import Action
 from hal.profile import RobotProfile
+from sim_backend.catalogue import load_world
 from sim_backend.foresight import Foresight
 from sim_backend.twin import Twin
-from sim_backend.world import load_world
 from tools.progress import Progress
 
 CRUISE_STEPS = 25

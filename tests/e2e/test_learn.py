@@ -16,8 +16,8 @@ from fusion.session import Session
 from fusion.trainer import ProcessTrainer
 from hal.governed import GovernedRobot
 from hal.profile import load_profile
+from sim_backend.catalogue import load_world
 from sim_backend.twin import Twin
-from sim_backend.world import load_world
 from tools.assembly import apprentice, lap, teacher
 from tools.processes import ChildProcess, lira_command
 

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from hal.profile import load_profile
+from sim_backend.catalogue import load_world
 from sim_backend.course import Course, Obstacles, footprint_radius_m
 from sim_backend.layout import Block, build
-from sim_backend.world import load_world
 
 
 @pytest.fixture(scope="module")

@@ -8,9 +8,9 @@ from hal.messages import Twist
 from hal.profile import load_profile
 from sim_backend import drive
 from sim_backend.body import Body
+from sim_backend.catalogue import load_world
 from sim_backend.course import Course
 from sim_backend.layout import build
-from sim_backend.world import load_world
 
 KINEMATIC = load_profile("thesis-sim").base
 WHEELS = load_profile("rosbot2").base

@@ -7,8 +7,8 @@ import pytest
 
 import sim_backend
 from hal.errors import ConfigError
+from sim_backend.catalogue import known_worlds, load_world
 from sim_backend.layout import build, distance_m
-from sim_backend.world import known_worlds, load_world
 
 OVAL = """
 description = "an oval"

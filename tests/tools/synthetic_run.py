@@ -7,8 +7,8 @@ import numpy as np
 
 from fusion.record import LapRecord, Pose, ResultRecord, RunRecord, RunWriter, StepRecord
 from hal.messages import Decision, ExpertView, LabelCounts
+from sim_backend.catalogue import load_world
 from sim_backend.layout import build
-from sim_backend.world import load_world
 
 PERIOD_S = 0.2
 NEAR_M = 1.2

@@ -8,7 +8,8 @@ import pytest
 from hal.bus import Bus
 from hal.messages import STOP, Command, Twist
 from hal.remote import RemoteArena, RemoteRobot
-from sim_backend.world import World, load_world
+from sim_backend.catalogue import load_world
+from sim_backend.world import World
 from tools.processes import ChildProcess, free_port, lira_command
 
 

@@ -20,8 +20,8 @@ from hal.errors import StorageError
 from hal.governed import GovernedRobot
 from hal.messages import Action
 from hal.profile import load_profile
+from sim_backend.catalogue import load_world
 from sim_backend.twin import Twin
-from sim_backend.world import load_world
 from tools.assembly import apprentice, lap, teacher
 
 UNSEEN = 1000  # layouts from here on belong to nobody's training

@@ -5,8 +5,8 @@ from dataclasses import dataclass
 from functools import lru_cache
 
 from hal.errors import ConfigError
+from sim_backend.catalogue import load_world
 from sim_backend.layout import Block, build
-from sim_backend.world import load_world
 from tools.report.svg import Point
 
 

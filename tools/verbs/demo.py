@@ -46,7 +46,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Run the demo from start to report."""
     from hal.profile import load_profile
-    from sim_backend.world import load_world
+    from sim_backend.catalogue import load_world
     from tools.processes import free_port, lira_command
 
     load_profile(args.profile)  # what cannot work is refused before anything starts

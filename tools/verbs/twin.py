@@ -53,7 +53,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Serve until told to stop."""
     from hal.profile import load_profile
-    from sim_backend.world import load_world
+    from sim_backend.catalogue import load_world
 
     # What is wrong with the words is said at once, before anything heavy is loaded.
     profile, world = load_profile(args.profile), load_world(args.world)
