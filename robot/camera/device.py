@@ -1,0 +1,71 @@
+"""The camera in a thread of its own: grabs, keeps what is sent small, and says when it is lost."""
+
+import threading
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+import cv2
+import numpy as np
+
+from hal.errors import DeviceError
+from hal.messages import CompressedImage
+from hal.profile import Camera
+from robot.camera.source import Picture, Source, open_source
+
+GRAB_S = 0.2
+FIRST_S = 5.0  # some cameras take their time to begin
+SILENCE_S = 1.0
+LIMIT_BYTES = 64_000  # what travels over the bus
+QUALITIES = (75, 50, 25, 10)
+
+
+class CameraDevice:
+    """Hands each picture of the source at `url` to `put`. `session` is for a `Keeper`.
+
+    Pixels are handed on as they are: the HAL server makes JPEGs of them in a thread of its own, if anybody listens.
+    """
+
+    def __init__(self, url: str, camera: Camera, put: Callable[[Picture], None], openni_folder: Path | None) -> None:
+        self._url = url
+        self._size = (camera.width_px, camera.height_px)
+        self._put = put
+        self._folder = openni_folder
+        self.pictures = 0
+
+    def session(self, stop: threading.Event, begin: Callable[[], None]) -> None:
+        """Open, grab until `stop` is set or the camera is lost, and let go. Raises `DeviceError`."""
+        source = open_source(self._url, self._size, self._folder)
+        try:
+            self._grab(source, stop, begin)
+        finally:
+            source.close()
+
+    def _grab(self, source: Source, stop: threading.Event, begin: Callable[[], None]) -> None:
+        heard_s, patience_s = time.monotonic(), FIRST_S
+        while not stop.is_set():
+            picture = source.grab(GRAB_S)
+            now_s = time.monotonic()
+            if picture is not None:
+                self._put(shrink(picture) if isinstance(picture, CompressedImage) else picture)
+                self.pictures += 1
+                if patience_s == FIRST_S:
+                    begin()
+                heard_s, patience_s = now_s, SILENCE_S
+            elif now_s - heard_s > patience_s:
+                raise DeviceError(f"the camera at {self._url} sends no pictures", "Check its power, plug and network.")
+
+
+def shrink(picture: CompressedImage) -> CompressedImage:
+    """Encode a JPEG that is too large to travel again, at the best quality that fits. Raises `DeviceError`."""
+    if len(picture.data) <= LIMIT_BYTES:
+        return picture
+    pixels = cv2.imdecode(np.frombuffer(picture.data, np.uint8), cv2.IMREAD_COLOR)
+    if pixels is None:
+        raise DeviceError("the camera sends what is no JPEG", "Set it to send JPEGs.")
+    data = picture.data
+    for quality in QUALITIES:
+        data = cv2.imencode(".jpg", pixels, [cv2.IMWRITE_JPEG_QUALITY, quality])[1].tobytes()
+        if len(data) <= LIMIT_BYTES:
+            break
+    return CompressedImage(picture.stamp_s, data)

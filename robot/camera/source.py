@@ -1,0 +1,52 @@
+"""One port for every source of pictures, and which URL names which."""
+
+from pathlib import Path
+from typing import Protocol
+from urllib.parse import urlsplit
+
+from hal.errors import ConfigError
+from hal.messages import CompressedImage, Image
+
+Picture = Image | CompressedImage
+
+
+class Source(Protocol):
+    """Something that takes pictures. It is used by one thread, and every call comes back in time."""
+
+    def grab(self, timeout_s: float) -> Picture | None:
+        """Return the newest picture with its time of capture on the monotonic clock; None after the time.
+
+        Raises `DeviceError` when the source is lost.
+        """
+
+    def close(self) -> None:
+        """Let go of it. May be called twice."""
+
+
+def open_source(url: str, size: tuple[int, int], openni_folder: Path | None) -> Source:
+    """Open `openni:`, `http(s)://` (MJPEG), `rtsp://`, `/dev/video0` or a folder of images.
+
+    `size` (width, height) is asked of sources that have a choice. Raises `DeviceError`, or `ConfigError` for a URL of
+    none of these forms.
+    """
+    scheme = urlsplit(url).scheme
+    if scheme == "openni":
+        from robot.camera.astra import OpenniSource
+
+        return OpenniSource(url.removeprefix("openni:"), size, openni_folder)
+    if scheme in ("http", "https"):
+        from robot.camera.mjpeg import MjpegSource
+
+        return MjpegSource(url)
+    if scheme in ("rtsp", "rtsps") or url.startswith("/dev/"):
+        from robot.camera.video import VideoSource
+
+        return VideoSource(url, size)
+    if Path(url).is_dir():
+        from robot.camera.folder import FolderSource
+
+        return FolderSource(Path(url))
+    raise ConfigError(
+        f"'{url}' is no camera",
+        "Use openni: (Astra), /dev/video0 (UVC), http://... (MJPEG), rtsp://..., or a folder of images.",
+    )

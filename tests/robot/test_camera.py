@@ -1,0 +1,193 @@
+import time
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from hal.errors import ConfigError, DeviceError
+from hal.messages import CompressedImage, Image
+from hal.profile import load_profile
+from robot.camera.device import LIMIT_BYTES, CameraDevice, shrink
+from robot.camera.mjpeg import parse_parts
+from robot.camera.source import open_source
+from robot.keeper import Keeper
+from sim_backend.emulators.camera import MjpegServer
+
+CAMERA = load_profile("rosbot2").camera
+DEBIAN = sorted(Path("/usr/lib").glob("*/libOpenNI2.so.0"))
+NO_OPENNI = "libopenni2-0 is not installed"
+
+
+def jpeg(gray, size=(64, 48), noise=0.0):
+    pixels = np.full((size[1], size[0], 3), gray, np.uint8)
+    if noise:
+        pixels = np.random.default_rng(0).integers(0, 255, pixels.shape).astype(np.uint8)
+    return cv2.imencode(".jpg", pixels, [cv2.IMWRITE_JPEG_QUALITY, 95])[1].tobytes()
+
+
+class Watch:
+    """A camera device on a source."""
+
+    def __init__(self, url, openni=None):
+        self.pictures = []
+        self.device = CameraDevice(url, CAMERA, self.pictures.append, openni)
+        self.keeper = Keeper("camera", self.device.session)
+
+    def __enter__(self):
+        self.keeper.start()
+        return self
+
+    def __exit__(self, *_):
+        self.keeper.close()
+
+    def wait(self, count, timeout_s=6.0):
+        until_s = time.monotonic() + timeout_s
+        while len(self.pictures) < count:
+            assert time.monotonic() < until_s, self.keeper.failure
+            time.sleep(0.01)
+        return self.pictures[-1]
+
+
+def test_a_folder_is_shown_in_order_and_over_again(tmp_path):
+    for i, gray in enumerate([10, 200]):
+        (tmp_path / f"{i}.jpg").write_bytes(jpeg(gray))
+    cv2.imwrite(str(tmp_path / "2.png"), np.full((4, 5, 3), (1, 2, 3), np.uint8))
+    (tmp_path / "notes.txt").write_text("no image")
+    with Watch(str(tmp_path)) as watch:
+        watch.wait(4)
+    first, second, third, again = watch.pictures[:4]
+    assert first.data == again.data == jpeg(10)
+    assert second.data == jpeg(200)
+    assert third.data[0, 0].tolist() == [3, 2, 1]  # red first
+    assert 0.03 < second.stamp_s - first.stamp_s < 0.5
+
+
+def test_an_mjpeg_stream_passes_pictures_on_as_they_are():
+    server = MjpegServer()
+    server.show(jpeg(50))
+    with Watch(server.url) as watch:
+        assert watch.wait(1) == CompressedImage(watch.pictures[0].stamp_s, jpeg(50))
+        shown_s = time.monotonic()
+        server.show(jpeg(60))
+        seen = watch.wait(2)
+        assert seen.data == jpeg(60)
+        assert 0.0 <= seen.stamp_s - shown_s < 0.2
+    server.close()
+
+
+def test_a_stream_that_ends_is_lost_and_comes_back():
+    server = MjpegServer()
+    server.show(jpeg(50))
+    with Watch(server.url) as watch:
+        watch.wait(1)
+        server.close()
+        until_s = time.monotonic() + 3.0
+        while watch.keeper.alive:
+            assert time.monotonic() < until_s
+            time.sleep(0.01)
+        assert watch.keeper.failure.remedy
+        again = MjpegServer(server.port)
+        again.show(jpeg(70))
+        assert watch.wait(2).data == jpeg(70)
+        again.close()
+
+
+PARTS = b"".join(b"--x\r\nContent-Type: image/jpeg\r\n%s\r\n%s\r\n" % (b"Content-Length: %d\r\n" % 40, body)
+                 for body in (b"--x\r\n\r\n" + b"a" * 33, b"b" * 40))  # fmt: skip
+LENGTHLESS = b"".join(b"--x\r\nContent-Type: image/jpeg\r\n\r\n%s\r\n" % body for body in (b"a" * 40, b"b" * 40))
+
+
+@settings(max_examples=60, deadline=None)
+@given(cut=st.integers(0, len(PARTS)), stream=st.sampled_from([PARTS, LENGTHLESS + b"--x\r\n"]))
+def test_parts_are_found_however_they_are_cut(cut, stream):
+    first, rest = parse_parts(stream[:cut], b"x")
+    second, _ = parse_parts(rest + stream[cut:], b"x")
+    bodies = first + second
+    assert [body[-1:] for body in bodies] == [b"a", b"b"]
+    assert all(len(body) == 40 for body in bodies)
+
+
+@settings(max_examples=60, deadline=None)
+@given(st.binary(max_size=300))
+def test_noise_in_a_stream_is_no_error(data):
+    parse_parts(data, b"x")
+
+
+def test_a_picture_too_large_to_travel_is_encoded_again():
+    large = jpeg(0, (640, 480), noise=1.0)
+    assert len(large) > LIMIT_BYTES
+    small = shrink(CompressedImage(1.0, large))
+    assert len(small.data) <= LIMIT_BYTES
+    assert cv2.imdecode(np.frombuffer(small.data, np.uint8), cv2.IMREAD_COLOR).shape == (480, 640, 3)
+    assert shrink(CompressedImage(1.0, jpeg(5))).data == jpeg(5)
+
+
+def test_what_is_no_camera_is_said_with_the_remedy(tmp_path):
+    for url, error, what in [
+        ("bluetooth:x", ConfigError, "is no camera"),
+        (str(tmp_path), DeviceError, "holds no image"),
+        ("http://127.0.0.1:1/", DeviceError, "no camera answers"),
+        ("/dev/video99", DeviceError, "no camera opens"),
+    ]:
+        with pytest.raises(error, match=what) as refused:
+            open_source(url, (640, 480), None)
+        assert refused.value.remedy
+
+
+def test_a_page_that_is_no_stream_is_refused():
+    from http.server import BaseHTTPRequestHandler, HTTPServer
+    from threading import Thread
+
+    class Page(BaseHTTPRequestHandler):
+        def do_GET(self):
+            self.send_response(404)
+            self.end_headers()
+
+        def log_message(self, *_):
+            pass
+
+    server = HTTPServer(("127.0.0.1", 0), Page)
+    thread = Thread(target=server.handle_request)
+    thread.start()
+    with pytest.raises(DeviceError, match="no MJPEG stream"):
+        open_source(f"http://127.0.0.1:{server.server_address[1]}/", (640, 480), None)
+    thread.join()
+    server.server_close()
+
+
+@pytest.fixture
+def openni(tmp_path):
+    """Debian's OpenNI2 under the name that the Python package looks for."""
+    if not DEBIAN:
+        pytest.skip(NO_OPENNI)
+    (tmp_path / "libOpenNI2.so").symlink_to(DEBIAN[0])
+    (tmp_path / "OpenNI2").symlink_to(DEBIAN[0].parent / "OpenNI2")
+    return tmp_path
+
+
+def test_openni_takes_pictures_and_can_be_opened_again(openni):
+    for _ in range(2):
+        with Watch("openni:Dummy", openni) as watch:
+            watch.wait(5)
+        first, *_, last = watch.pictures
+        assert isinstance(first, Image)
+        assert first.data.shape == (240, 320, 3)
+        assert first.data.dtype == np.uint8
+        assert not np.array_equal(first.data, last.data)  # its ball moves
+        periods_s = np.diff([picture.stamp_s for picture in watch.pictures])
+        assert 0.01 < np.median(periods_s) < 0.1
+
+
+def test_without_a_camera_or_the_library_openni_says_what_to_do(openni):
+    with pytest.raises(DeviceError, match="no camera opens through OpenNI2"):
+        open_source("openni:", (640, 480), openni)
+
+
+def test_without_the_library_openni_says_where_it_belongs(tmp_path, monkeypatch):
+    monkeypatch.setattr("openni.openni2.loaded_dll_directory", None)  # another test may have loaded it
+    with pytest.raises(DeviceError, match="does not load") as refused:
+        open_source("openni:", (640, 480), tmp_path)
+    assert "--openni" in refused.value.remedy
