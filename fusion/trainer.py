@@ -165,6 +165,7 @@ class _SharedWeights:
 
 def _serve(pickled: bytes, pipe: Connection, shared: _SharedWeights) -> None:
     """Keep labels and train until the other end of the pipe is closed. None asks for a training step."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C reaches the whole group; the owner ends this process
     os.nice(NICENESS)
     torch.set_num_threads(1)
     _warm_up()
