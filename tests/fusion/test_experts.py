@@ -1,0 +1,72 @@
+import numpy as np
+import pytest
+
+from fusion.checkpoint import Checkpoint, save_checkpoint
+from fusion.experts import as_expert, load_expert, load_network
+from fusion.networks import CameraNet, FusionNet, LidarNet
+from fusion.preprocess import Features
+from hal.errors import ConfigError, StorageError
+from hal.profile import load_profile
+
+SIM, REAL = load_profile("thesis-sim"), load_profile("rosbot2")
+FEATURES = Features(np.full(101, 0.5, np.float32), np.full((32, 32), 0.5, np.float32))
+
+
+def save(path, kind, network, bins, filters, profile="rosbot2", cruise=None):
+    save_checkpoint(path, network, Checkpoint(kind, bins, filters, profile, cruise, "lira train-expert", 0))
+    return str(path)
+
+
+@pytest.mark.parametrize("name", ["camera", "lidar"])
+def test_the_experts_that_come_with_the_project_load_by_name(name):
+    expert = load_expert(f"{name}-expert", SIM)
+    assert expert.name == name
+    assert expert.cruise[0] > 0.9  # at full speed
+    assert abs(expert.cruise[1]) < 0.1  # straight on
+    linear, angular = expert.act(FEATURES)
+    assert -1.0 <= linear <= 1.0
+    assert -1.0 <= angular <= 1.0
+    _, checkpoint = load_network(name, SIM)
+    assert checkpoint.provenance.startswith(f"lira train-expert {name}")
+
+
+def test_an_unknown_name_lists_the_known_ones():
+    with pytest.raises(ConfigError, match=r"unknown policy 'sonar-expert'.*camera-expert, lidar-expert.*safetensors"):
+        load_expert("sonar-expert", SIM)
+
+
+def test_a_profile_without_an_expert_says_how_to_train_one():
+    with pytest.raises(ConfigError, match=r"'rosbot2'.*lira train-expert camera --profile rosbot2"):
+        load_expert("camera-expert", REAL)
+
+
+def test_a_file_of_ones_own_is_named_after_its_sensor(tmp_path):
+    path = save(tmp_path / "mine.safetensors", "lidar", LidarNet(130, seed=1), 130, 32, cruise=(0.9, 0.01))
+    expert = load_expert(path, REAL)
+    assert (expert.name, expert.cruise) == ("lidar", (0.9, 0.01))
+
+
+@pytest.mark.parametrize(
+    ("network", "bins"),
+    [(LidarNet(130), 130), (CameraNet(32), 101), (FusionNet(130, 32), 130), (FusionNet(101, 32), 101)],
+)
+def test_the_checkpoint_of_another_robot_is_refused_with_both_names(tmp_path, network, bins):
+    path = save(tmp_path / "other.safetensors", network.kind, network, bins, 32)
+    with pytest.raises(ConfigError, match=r"trained for 'rosbot2'.*not for 'thesis-sim' \(101 beams, 16 filters\)"):
+        load_network(path, SIM)
+
+
+def test_what_an_expert_does_not_see_may_differ(tmp_path):
+    path = save(tmp_path / "camera.safetensors", "camera", CameraNet(16), 130, 16)
+    assert load_expert(path, SIM).name == "camera"
+
+
+def test_a_missing_file_is_one_clear_error(tmp_path):
+    with pytest.raises(StorageError, match="there is no checkpoint"):
+        load_expert(str(tmp_path / "none.safetensors"), SIM)
+
+
+def test_an_expert_is_a_black_box_that_sees_both_sensors():
+    network = FusionNet(101, 16, seed=3)
+    assert as_expert("both", network, None).act(FEATURES) == network.act(FEATURES.scan, FEATURES.image)
+    assert as_expert("both", network, None).cruise == (1.0, 0.0)

@@ -1,0 +1,105 @@
+"""The planner on the twin's own drive model: which way it goes around a box, and that it never goes into one."""
+
+import numpy as np
+import pytest
+
+from fusion.control import to_twist
+from fusion.planner import STAGES_S, Planner, action_sequences
+from hal.messages import Command, Episode
+from hal.profile import load_profile
+from sim_backend.foresight import Foresight
+from sim_backend.twin import Twin
+from sim_backend.world import Box, Limits, Line, Piece, World
+
+PROFILE = load_profile("thesis-sim")
+PERIOD_S = PROFILE.period_s
+BOX_M = 4.0
+STYLES = ["bang-bang", "proportional"]
+SWAY_M = {"bang-bang": 0.75, "proportional": 0.15}  # full steer or none weaves along the line
+
+
+def world(*boxes):
+    line = Line(pieces=(Piece(straight_m=40.0),))
+    return World(description="straight", line=line, box=boxes, limits=Limits(lost_m=3.0, finish_m=30.0))
+
+
+ONE_BOX = world(Box(x_m=BOX_M, y_m=0.0))
+
+
+def drive(floor, style, episode, seconds=7.0, *, follow_line=True):
+    """Return the states of a drive by the planner alone."""
+    planner = Planner(Foresight(PROFILE, floor), style, PERIOD_S, follow_line=follow_line)
+    twin = Twin(PROFILE, floor)
+    twin.reset(episode)
+    states = [twin.state()]
+    while states[-1].stamp_s < seconds:
+        twin.drive(Command(to_twist(planner.plan(states[-1]), PROFILE.base), twin.now()))
+        twin.wait(twin.now() + PERIOD_S)
+        states.append(twin.state())
+    return states
+
+
+def side(states):
+    """Return +1 if it passed the box on the left, -1 on the right."""
+    beside = min(states, key=lambda state: abs(state.x_m - BOX_M))
+    return np.sign(beside.y_m)
+
+
+@pytest.mark.parametrize("style", STYLES)
+@pytest.mark.parametrize(
+    ("lateral_m", "yaw_rad", "expected"),
+    [(0.0, 0.25, 1), (0.0, -0.25, -1), (0.3, 0.0, 1), (-0.3, 0.0, -1), (0.15, 0.2, 1), (-0.15, -0.2, -1)],
+)
+def test_the_side_follows_from_where_it_stands_and_looks(style, lateral_m, yaw_rad, expected):
+    states = drive(ONE_BOX, style, Episode(start_m=2.5, lateral_m=lateral_m, yaw_rad=yaw_rad))
+    assert side(states) == expected
+    assert not states[-1].collided
+
+
+@pytest.mark.parametrize("style", STYLES)
+@pytest.mark.parametrize("start_m", [0.0, 1.0, 2.0, 2.6, 3.0])
+def test_head_on_it_takes_one_side_and_never_the_box(style, start_m):
+    states = drive(ONE_BOX, style, Episode(start_m=start_m))
+    assert not any(state.collided for state in states)
+    assert states[-1].progress_m > BOX_M + 1.0
+    assert abs(states[-1].lateral_m) < SWAY_M[style]  # and back on the line
+
+
+@pytest.mark.parametrize("style", STYLES)
+def test_beside_the_line_it_goes_back_to_it(style):
+    states = drive(world(), style, Episode(lateral_m=0.9, yaw_rad=0.4))
+    assert abs(states[-1].lateral_m) < SWAY_M[style]
+
+
+@pytest.mark.parametrize("style", STYLES)
+def test_on_a_free_line_it_goes_straight_at_full_speed(style):
+    planner = Planner(Foresight(PROFILE, world()), style, PERIOD_S, follow_line=True)
+    assert planner.plan(drive(world(), style, Episode(), 0.0)[0]) == pytest.approx((1.0, 0.0))
+
+
+def test_between_two_boxes_it_takes_the_gap():
+    gap = world(Box(x_m=3.0, y_m=0.75), Box(x_m=3.0, y_m=-0.75))
+    states = drive(gap, "bang-bang", Episode(lateral_m=0.2), 5.0)
+    assert not states[-1].collided
+    assert all(abs(state.y_m) < 0.5 for state in states if 2.5 < state.x_m < 3.5)
+
+
+def test_close_to_a_wall_of_boxes_it_turns_on_the_spot_instead_of_hitting_it():
+    wall = world(*(Box(x_m=2.0, y_m=0.45 * k) for k in range(-3, 4)))
+    states = drive(wall, "bang-bang", Episode(start_m=1.45), 6.0)
+    assert not any(state.collided for state in states)
+
+
+def test_where_the_line_does_not_matter_it_goes_straight_on():
+    planner = Planner(Foresight(PROFILE, world()), "proportional", PERIOD_S, follow_line=False)
+    twin = Twin(PROFILE, world())
+    twin.reset(Episode(lateral_m=0.9))
+    assert planner.plan(twin.state()) == pytest.approx((1.0, 0.0), abs=1e-6)
+
+
+@pytest.mark.parametrize("style", STYLES)
+def test_sequences_cover_their_stages_and_stay_in_range(style):
+    sequences = action_sequences(style, PERIOD_S)
+    assert sequences.shape[1:] == (round(sum(STAGES_S) / PERIOD_S), 2)
+    assert np.abs(sequences).max() == 1.0
+    assert len(np.unique(sequences, axis=0)) == len(sequences)

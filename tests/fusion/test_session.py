@@ -1,0 +1,230 @@
+"""Sessions on a straight track that only exists here: walls that can be hit once, and a finish."""
+
+import math
+from dataclasses import replace
+
+import pytest
+
+from fusion.control import ControlLoop
+from fusion.journal import Journal
+from fusion.method import Choice, Lesson, Proposal
+from fusion.record import LapRecord
+from fusion.session import LOST_OBSERVATIONS, PUT_BACK_M, PUT_ON_M, Drive, Session
+from hal.errors import DeviceError
+from hal.governed import GovernedRobot
+from hal.messages import Episode
+from hal.null import NullRobot
+from hal.profile import load_profile
+
+PROFILE = load_profile("thesis-sim")
+STEP_M = PROFILE.period_s * PROFILE.base.max_linear_m_s
+NEVER_S = 60.0
+
+
+class Track(NullRobot):
+    """A straight line with walls across it; each falls when it is hit, so that whoever comes again gets past."""
+
+    def __init__(self, *, walls=(), finish_m=4.0, line=True):
+        super().__init__(PROFILE)
+        self.walls, self.finish_m, self.line = list(walls), finish_m, line
+        self.collided, self.episodes, self.blind = False, [], False
+
+    def reset(self, episode):
+        super().reset(episode)
+        self.collided = False
+        self.episodes.append(episode)
+
+    def read(self):
+        return replace(super().read(), scan=None) if self.blind else super().read()
+
+    def state(self):
+        state = super().state()
+        if not self.collided and self.walls and state.x_m >= self.walls[0]:
+            self.walls.pop(0)
+            self.collided = True
+        lost, finished = abs(state.y_m) > 1.5, state.x_m >= self.finish_m
+        place = {} if self.line else {"progress_m": math.nan, "lateral_m": math.nan}
+        return replace(state, collided=self.collided, lost=lost, finished=finished, **place)
+
+
+class Mind:
+    """A novice that is trained from its `after`-th lesson on."""
+
+    def __init__(self, action, after):
+        self.action, self.after, self.lessons = action, after, 0
+
+    @property
+    def training_steps(self):
+        return self.lessons // self.after
+
+    @property
+    def trained(self):
+        return self.training_steps > 0
+
+    def act(self, features):
+        return self.action
+
+
+class Pupil:
+    """A method whose novice drives, and counts what the human does."""
+
+    def __init__(self, action=(1.0, 0.0), after=1):
+        self.novice = Mind(action, after)
+        self.resets = 0
+
+    def reset(self):
+        self.resets += 1
+
+    def update(self, now_s):
+        pass
+
+    def propose(self, features):
+        return Proposal(features, Choice("novice", self.novice.action), self.novice.action)
+
+    def learn(self, proposal, human):
+        if human is None:
+            return Lesson(proposal.choice)
+        self.novice.lessons += 1
+        return Lesson(Choice("human", human, label=human), stored=True)
+
+    def policy(self, driver):
+        return self.novice.act
+
+
+class Hand:
+    """Holds the wheel for the first steps of every episode."""
+
+    def __init__(self, steps=1):
+        self.steps, self.left, self.layouts = steps, steps, []
+
+    def reset(self, layout):
+        self.left = self.steps
+        self.layouts.append(layout)
+
+    def act(self, state, proposal, policy):
+        self.left -= 1
+        return (1.0, 0.0) if self.left >= 0 else None
+
+
+def school(track, pupil=None):
+    """A session on a track, and where its lap records go."""
+    records = []
+    pupil = pupil or Pupil()
+    robot = GovernedRobot(track)
+    loop = ControlLoop(robot, truth=track.state)
+    session = Session(robot, track, loop, Journal(write=records.append), pupil)
+    loop.arm()
+    return session, lambda: [record for record in records if isinstance(record, LapRecord)]
+
+
+def test_a_lap_and_a_proving_run_on_the_same_drive_end_the_teaching():
+    track, hand = Track(), Hand()
+    session, laps = school(track)
+    assert session.teach([Drive(Episode(3), NEVER_S)], hand, 5)
+    assert [(lap.phase, lap.lap, lap.layout, lap.passed, lap.unassisted) for lap in laps()] == [
+        ("train", 1, 3, True, False),
+        ("prove", 1, 3, True, True),
+    ]
+    assert track.episodes == [Episode(3)] * 2
+    assert hand.layouts == [3]  # nobody holds the novice's hand while it proves itself
+
+
+def test_a_novice_without_a_training_step_proves_nothing():
+    session, laps = school(Track(), Pupil(after=3))
+    assert session.teach([Drive(Episode(), NEVER_S)], Hand(), 5)
+    assert [lap.phase for lap in laps()] == ["train", "train", "train", "prove"]
+
+
+def test_after_a_crash_in_training_it_starts_again_before_it():
+    track, hand = Track(walls=[3.0]), Hand(steps=0)
+    session, laps = school(track, pupil := Pupil())
+    session.teach([Drive(Episode(), NEVER_S)], hand, 1)
+    first, again = track.episodes
+    assert first == Episode()
+    assert again.start_m == pytest.approx(3.0 - PUT_BACK_M, abs=1.5 * STEP_M)
+    assert pupil.resets == len(hand.layouts) == 2
+    (lap,) = laps()
+    assert (lap.collisions, lap.passed) == (1, False)
+    assert lap.duration_s == pytest.approx((4.0 + PUT_BACK_M) / PROFILE.base.max_linear_m_s, abs=0.5)
+
+
+def test_a_crash_near_the_start_starts_at_the_start():
+    track = Track(walls=[0.5])
+    session, _ = school(track)
+    session.teach([Drive(Episode(), NEVER_S)], Hand(), 1)
+    assert track.episodes[1] == Episode(start_m=0.0)
+
+
+def test_a_world_without_a_line_is_started_all_over():
+    track = Track(walls=[3.0], line=False)
+    session, laps = school(track)
+    drive = Drive(Episode(2, lateral_m=0.1), NEVER_S)
+    session.teach([drive], Hand(), 1)
+    assert track.episodes[:2] == [drive.episode] * 2
+    assert laps()[0].lateral_rms_m is None
+
+
+def test_a_proving_run_ends_at_the_first_harm():
+    track = Track(walls=[1.0] * 50)
+    session, laps = school(track)
+    assert not session.teach([Drive(Episode(layout), 3.0) for layout in (0, 1)], Hand(), 1)
+    train, prove = laps()
+    assert train.collisions > 2
+    assert (prove.collisions, prove.passed) == (1, False)
+    assert prove.duration_s == pytest.approx(1.0, abs=0.3)
+    assert track.episodes[-1] == Episode(0)  # neither put back nor on to the next drive
+
+
+def test_a_run_that_meets_its_cap_is_reported_as_such():
+    session, laps = school(Track(), Pupil(action=(0.1, 0.0)))
+    assert not session.teach([Drive(Episode(), 2.0)], Hand(), 3)
+    assert [lap.phase for lap in laps()] == ["train", "prove"] * 3
+    assert not any(lap.passed for lap in laps())
+    result = session.result(converged=False)
+    assert (result.converged, result.laps) == (False, 3)
+    assert result.human_labels + result.demonstration == 3
+    assert result.simulated_s == pytest.approx(12.0, abs=1.5)
+
+
+def test_on_unseen_layouts_it_goes_on_behind_a_crash():
+    track = Track(walls=[2.0])
+    session, laps = school(track)
+    shown = session.show([Drive(Episode(layout), NEVER_S) for layout in (7, 8)])
+    assert shown == laps()
+    assert [(lap.phase, lap.lap, lap.layout, lap.collisions) for lap in shown] == [
+        ("unseen", 1, 7, 1),
+        ("unseen", 2, 8, 0),
+    ]
+    assert track.episodes[1].start_m == pytest.approx(2.0 + PUT_ON_M, abs=1.5 * STEP_M)
+    assert track.episodes[1].layout == 7
+
+
+@pytest.mark.parametrize(
+    ("goal", "turn", "passed"),
+    [("finish", 0.0, True), ("finish", 0.9, False), ("leave", 0.9, True), ("stay", 0.9, True), ("stay", 0.0, True)],
+)
+def test_what_counts_as_passed_depends_on_the_goal(goal, turn, passed):
+    session, _ = school(Track(), Pupil(action=(1.0, turn)))
+    (lap,) = session.show([Drive(Episode(yaw_rad=turn), 3.0 if turn else NEVER_S, goal)])
+    assert lap.passed is passed
+
+
+def test_a_drive_may_have_to_end_near_the_line():
+    session, _ = school(Track())
+    near, far = (Drive(Episode(lateral_m=lateral), 1.0, "stay", final_lateral_m=0.35) for lateral in (0.3, -0.5))
+    assert [lap.passed for lap in session.show([near, far])] == [True, False]
+
+
+def test_out_of_time_is_not_passed():
+    session, _ = school(Track(), Pupil(action=(0.1, 0.0)))
+    (lap,) = session.show([Drive(Episode(), 2.0)])
+    assert (lap.passed, lap.collisions, lap.lost) == (False, 0, 0)
+    assert lap.duration_s == pytest.approx(2.0, abs=0.3)
+
+
+def test_a_sensor_that_stays_silent_ends_the_session_and_is_named():
+    track = Track()
+    track.blind = True
+    session, _ = school(track)
+    with pytest.raises(DeviceError, match=f"{LOST_OBSERVATIONS} observations in a row.*nothing new from the lidar"):
+        session.show([Drive(Episode(), NEVER_S)])

@@ -1,0 +1,189 @@
+"""The scripted teacher: when it takes the wheel and lets go, in a made-up future, and that nothing is hit in a twin."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+import pytest
+
+from fusion.control import to_twist
+from fusion.method import Call, Choice, Proposal
+from fusion.preprocess import Features
+from fusion.teacher import PERFECT, SKILLED, ScriptedTeacher, TeacherSettings
+from hal.messages import Command, CourseState
+from hal.profile import load_profile
+from sim_backend.foresight import Foresight
+from sim_backend.twin import Twin
+from sim_backend.world import Box, Limits, Line, Piece, World
+
+PROFILE = load_profile("thesis-sim")
+PERIOD_S = PROFILE.period_s
+FEATURES = Features(np.zeros(101, np.float32), np.zeros((32, 32), np.float32))
+QUIET = Proposal(FEATURES, Choice("novice", (1.0, 0.0)))
+CALLED = Proposal(FEATURES, Choice("novice", (1.0, 0.0), call=Call.FEEDBACK))
+SURE = {"delay_sigma": 0.0, "gain_sigma": 0.0, "wrong_direction": 0.0, "missed": 0.0}
+
+
+def straight(features):
+    return 1.0, 0.0
+
+
+@dataclass
+class Futures:
+    clearance_m: np.ndarray
+    lateral_m: np.ndarray
+    heading_error_rad: np.ndarray
+
+
+class Crystal:
+    """A foresight in which `danger` says how it ends, and a left turn is always the best way out."""
+
+    def __init__(self):
+        self.danger, self.layouts, self.rollouts = False, [], 0
+
+    def set_layout(self, layout):
+        self.layouts.append(layout)
+
+    def rollout(self, state, policy, steps, period_s):
+        self.rollouts += 1
+        return [replace(state, collided=self.danger)]
+
+    def imagine(self, state, actions, period_s):
+        lateral = 3.0 - np.cumsum(actions[:, :, 1], axis=1) * period_s
+        return Futures(np.full(lateral.shape, 1.0), lateral, np.zeros(lateral.shape))
+
+
+def at(step):
+    """Return the truth in the middle of nowhere, so many steps after the start."""
+    return CourseState(step * PERIOD_S, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, clearance_m=1.0)
+
+
+@pytest.fixture
+def crystal():
+    return Crystal()
+
+
+def teacher(crystal, seed=0, **settings):
+    made = ScriptedTeacher(crystal, PROFILE, TeacherSettings(**SURE | settings), seed)
+    made.reset(4)
+    return made
+
+
+def drive(hand, crystal, dangers, proposal=QUIET):
+    """Return whether it holds the wheel at each step, with danger where `dangers` has an x."""
+    held = []
+    for step, mark in enumerate(dangers):
+        crystal.danger = mark == "x"
+        held.append(hand.act(at(step), proposal, straight) is not None)
+    return "".join("H" if each else "-" for each in held)
+
+
+def test_a_perfect_teacher_takes_over_at_once_and_lets_go_after_three_safe_steps(crystal):
+    hand = ScriptedTeacher(crystal, PROFILE, PERFECT, seed=0)
+    assert drive(hand, crystal, "..xx......") == "--HHHH----"
+
+
+def test_a_danger_in_between_starts_the_count_anew(crystal):
+    hand = ScriptedTeacher(crystal, PROFILE, PERFECT, seed=0)
+    assert drive(hand, crystal, "x..x..x....") == "HHHHHHHHH--"
+
+
+def test_safe_steps_are_a_setting(crystal):
+    assert drive(teacher(crystal, delay_s=0.0, safe_steps=1), crystal, "xx...") == "HH---"
+
+
+def test_a_human_reacts_after_a_while_and_sooner_when_called(crystal):
+    assert drive(teacher(crystal, delay_s=0.6, called_delay_s=0.2), crystal, "xxxxxx") == "---HHH"
+    assert drive(teacher(crystal, delay_s=0.6, called_delay_s=0.2), crystal, "xxxxxx", CALLED) == "-HHHHH"
+
+
+def test_a_danger_that_passes_before_the_hand_moves_is_left_alone(crystal):
+    assert drive(teacher(crystal, delay_s=0.6), crystal, "xx.xx.xxxx") == "---------H"
+
+
+def test_a_missed_danger_is_missed_for_as_long_as_it_lasts(crystal):
+    assert drive(teacher(crystal, delay_s=0.0, missed=1.0), crystal, "xxxxxxxxxx") == "----------"
+
+
+def test_the_delay_is_log_normal_around_its_median(crystal):
+    waits = []
+    for seed in range(200):
+        held = drive(teacher(crystal, seed, delay_s=0.6, delay_sigma=0.3), crystal, "x" * 12)
+        waits.append(held.index("H") * PERIOD_S)
+    assert np.median(waits) == pytest.approx(0.6, abs=1.1 * PERIOD_S)
+    assert len(set(waits)) > 3
+
+
+def test_a_confused_human_turns_the_wrong_way_for_two_steps(crystal):
+    crystal.danger = True
+    right, confused = teacher(crystal, delay_s=0.0), teacher(crystal, delay_s=0.0, wrong_direction=1.0)
+    turns = [[hand.act(at(step), QUIET, straight)[1] for step in range(4)] for hand in (right, confused)]
+    assert turns == [[1.0] * 4, [-1.0, -1.0, 1.0, 1.0]]
+
+
+def test_over_and_understeer_last_for_an_intervention_and_stay_in_range(crystal):
+    crystal.danger = True
+    turns = []
+    for seed in range(40):
+        hand = teacher(crystal, seed, delay_s=0.0, gain_sigma=0.5)
+        first, second = (hand.act(at(step), QUIET, straight)[1] for step in range(2))
+        assert first == second
+        turns.append(first)
+    assert min(turns) < 0.7
+    assert max(turns) == 1.0
+
+
+def test_the_initial_demonstration_is_driven_without_faults(crystal):
+    hand = teacher(crystal, wrong_direction=1.0, missed=1.0, gain_sigma=1.0)
+    assert [hand.act(at(step), QUIET, None) for step in range(3)] == [(1.0, 1.0)] * 3
+    assert crystal.rollouts == 0
+
+
+def test_a_new_episode_begins_with_hands_off_and_the_layout_in_mind(crystal):
+    hand = teacher(crystal, delay_s=0.0)
+    assert drive(hand, crystal, "xx") == "HH"
+    hand.reset(9)
+    assert drive(hand, crystal, "..") == "--"
+    assert crystal.layouts == [4, 9]
+
+
+def test_one_seed_is_one_teacher(crystal):
+    script = "..xxxx.....xxxx....xxxxxxx......"
+    human = TeacherSettings()
+    drives = [drive(ScriptedTeacher(crystal, PROFILE, human, seed), crystal, script) for seed in (1, 1, 2, 3, 4)]
+    assert drives[0] == drives[1]
+    assert len(set(drives)) > 1
+
+
+WORLD = World(
+    description="a straight line with a box on it",
+    line=Line(pieces=(Piece(straight_m=20.0),)),
+    box=(Box(x_m=4.0, y_m=0.05),),
+    limits=Limits(lost_m=1.5, finish_m=10.0),
+)
+
+
+@pytest.mark.parametrize("settings", [PERFECT, SKILLED])
+def test_in_the_twin_it_takes_over_before_the_box_drives_around_it_and_hands_back(settings):
+    foresight = Foresight(PROFILE, WORLD)
+    hand = ScriptedTeacher(foresight, PROFILE, settings, seed=0)
+    hand.reset(0)
+    twin = Twin(PROFILE, WORLD)
+    held, nearest_m = [], np.inf
+    for _ in range(60):
+        state = twin.state()
+        action = hand.act(state, QUIET, straight)
+        held.append(action is not None)
+        # Left alone the policy goes straight on, along its line.
+        twist = to_twist(action or (1.0, float(np.clip(-2.0 * state.yaw_rad, -1, 1))), PROFILE.base)
+        twin.drive(Command(twist, twin.now()))
+        twin.wait(twin.now() + PERIOD_S)
+        nearest_m = min(nearest_m, twin.state().clearance_m)
+    foresight.close()
+    state = twin.state()
+    assert not state.collided
+    assert not state.lost
+    assert state.progress_m > 8.0
+    assert nearest_m > 0.0
+    assert not held[0]
+    assert any(held)
+    assert not held[-1]
