@@ -12,7 +12,7 @@ from pathlib import Path
 from types import TracebackType
 from typing import Self
 
-from hal.errors import LiraError
+from hal.errors import LiraError, StorageError
 
 STOP_SIGNALS = ((signal.SIGINT, 6.0), (signal.SIGTERM, 3.0), (signal.SIGKILL, 5.0))
 POLL_S = 0.02
@@ -53,8 +53,12 @@ class ChildProcess:
     def __init__(self, name: str, command: Sequence[str], log: Path) -> None:
         self.name = name
         self.log = log
-        log.parent.mkdir(parents=True, exist_ok=True)
-        with log.open("wb") as output:
+        try:
+            log.parent.mkdir(parents=True, exist_ok=True)
+            output = log.open("wb")
+        except OSError as error:
+            raise StorageError(f"cannot write {log}: {error.strerror}", "Choose another folder.") from error
+        with output:
             self._process = subprocess.Popen(
                 command,
                 stdin=subprocess.DEVNULL,

@@ -18,14 +18,17 @@ import signal
 import sys
 import time
 from datetime import datetime
+from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from hal.errors import ConfigError
+from hal.errors import ConfigError, MissingExtraError
+from tools.arguments import natural
 
 if TYPE_CHECKING:
     from tools.processes import ChildProcess
 
+NEEDED = {"pybullet": "sim", "torch": "learn"}  # by the two processes, and the extras that bring them
 READY_S = 60.0
 POLL_S = 0.1
 STALL_S = 60.0
@@ -36,10 +39,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add = parser.add_argument
     add("--world", default="line-obstacles", help="world by name or .toml file (default: %(default)s)")
     add("--profile", default="thesis-sim", help="robot by name or .toml file (default: %(default)s)")
-    add("--seed", type=int, default=0, help="seeds teacher, training and noise (default: %(default)s)")
-    add("--layout", type=int, default=0, help="layout to learn on (default: %(default)s)")
-    add("--laps", type=int, default=12, help="give up after so many training laps (default: %(default)s)")
-    add("--unseen", type=int, default=3, help="unseen layouts to drive afterwards (default: %(default)s)")
+    add("--seed", type=natural, default=0, help="seeds teacher, training and noise (default: %(default)s)")
+    add("--layout", type=natural, default=0, help="layout to learn on (default: %(default)s)")
+    add("--laps", type=natural, default=12, help="give up after so many training laps (default: %(default)s)")
+    add("--unseen", type=natural, default=3, help="unseen layouts to drive afterwards (default: %(default)s)")
     add("--run", type=Path, metavar="DIR", help="folder of the run (default: runs/demo-<date-time>)")
 
 
@@ -49,8 +52,12 @@ def run(args: argparse.Namespace) -> int:
     from sim_backend.catalogue import load_world
     from tools.processes import free_port, lira_command
 
-    load_profile(args.profile)  # what cannot work is refused before anything starts
+    # What cannot work is refused before anything starts.
+    load_profile(args.profile)
     load_world(args.world)
+    for package, extra in NEEDED.items():
+        if find_spec(package) is None:
+            raise MissingExtraError(package, extra)
     folder: Path = args.run or Path("runs") / f"demo-{datetime.now():%Y%m%d-%H%M%S}"
     port = free_port()
     name, endpoint = f"demo_{port}", f"127.0.0.1:{port}"

@@ -21,6 +21,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from hal.errors import ConfigError
+from tools.arguments import natural
 
 if TYPE_CHECKING:
     from fusion.hg_dagger import HgDagger
@@ -48,11 +49,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="who helps: a person with a gamepad (none), or on a twin a script with or without a human's faults",
     )
     add(
-        "--train-laps", type=int, default=12, help="scripted teacher: give up after so many laps (default: %(default)s)"
+        "--train-laps",
+        type=natural,
+        default=12,
+        help="scripted teacher: give up after so many laps (default: %(default)s)",
     )
-    add("--unseen", type=int, default=0, help="then drive so many unseen layouts alone (default: %(default)s)")
-    add("--layout", type=int, default=0, help="layout to learn on (default: %(default)s)")
-    add("--seed", type=int, default=0, help="seeds teacher and training (default: %(default)s)")
+    add("--unseen", type=natural, default=0, help="then drive so many unseen layouts alone (default: %(default)s)")
+    add("--layout", type=natural, default=0, help="layout to learn on (default: %(default)s)")
+    add("--seed", type=natural, default=0, help="seeds teacher and training (default: %(default)s)")
     add("--run", type=Path, metavar="DIR", help="folder for what is learned (default: runs/<method>)")
     add("--as-command", help=argparse.SUPPRESS)  # what a report shows as the command that repeats the run
 
@@ -91,7 +95,7 @@ def show_policy(args: argparse.Namespace, robot: "RemoteRobot") -> int:
     loop = ControlLoop(robot)
     with stop_on_signal() as stop:
         loop.arm()
-        print(f"'{args.policy}' drives '{args.name}'; stop with Ctrl-C", flush=True)
+        say(f"'{args.policy}' drives '{args.name}'; stop with Ctrl-C")
         serve(loop, Alone(expert.name, expert.act), Journal(publish=publisher(robot)), stop, say)
     return 0
 
@@ -109,11 +113,11 @@ def learn_from_person(args: argparse.Namespace, robot: "RemoteRobot") -> int:
     from tools.assembly import apprentice
 
     folder: Path = args.run or Path("runs") / args.method
-    folder.mkdir(parents=True, exist_ok=True)
-    method = apprentice(lira_settings(args), robot.profile, args.seed, ProcessTrainer)
-    novice = method.novice
-    try:
-        with RunWriter(folder / RECORD) as record, DemonstrationLog(folder / LABELS, robot.profile) as log:
+    # The log goes first: if it is damaged, nothing else is touched.
+    with DemonstrationLog(folder / LABELS, robot.profile) as log, RunWriter(folder / RECORD) as record:
+        method = apprentice(lira_settings(args), robot.profile, args.seed, ProcessTrainer)
+        novice = method.novice
+        try:
             for old in read_demonstrations(folder / LABELS):
                 if old.stored:
                     novice.remember(Label(old.scan, old.image, old.action, old.source))
@@ -121,10 +125,10 @@ def learn_from_person(args: argparse.Namespace, robot: "RemoteRobot") -> int:
             with stop_on_signal() as stop:
                 loop = ControlLoop(robot)
                 loop.arm()
-                print(f"{args.method} learns on '{args.name}' with {novice.stored} labels; hold the dead-man to drive")
+                say(f"{args.method} learns on '{args.name}' with {novice.stored} labels; hold the dead-man to drive")
                 serve(loop, method, journal, stop, say, lambda: novice.training_steps)
-    finally:
-        novice.close()
+        finally:
+            novice.close()
     save(folder, method, robot, args)
     return 0
 
@@ -149,11 +153,11 @@ def learn_from_script(args: argparse.Namespace, robot: "RemoteRobot") -> int:
     if world is None:
         raise ConfigError("a scripted teacher needs a twin to see in", "Use --teacher none with a gamepad here.")
     folder: Path = args.run or Path("runs") / args.method
-    if (folder / RECORD).exists():
+    if (folder / RECORD).exists() or (folder / LABELS).exists():
         raise ConfigError(f"{folder} already holds a run", "Choose another folder with --run.")
     profile = robot.profile
     in_step = partial(ProcessTrainer, adopt_after_s=profile.period_s)  # one period later, whatever it took
-    with RunWriter(folder / RECORD) as record, DemonstrationLog(folder / LABELS, profile) as log:
+    with DemonstrationLog(folder / LABELS, profile) as log, RunWriter(folder / RECORD) as record:
         command = args.as_command or shlex.join(["lira", *sys.argv[1:]])
         preset = args.preset if args.method == "lira" else ""
         record.write(

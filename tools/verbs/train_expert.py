@@ -12,14 +12,15 @@ examples:
 import argparse
 from pathlib import Path
 
-from hal.errors import LiraError
+from hal.errors import LiraError, StorageError
+from tools.arguments import natural
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the verb's arguments."""
     parser.add_argument("expert", choices=["camera", "lidar"], help="which sensor it sees")
     parser.add_argument("--profile", default="thesis-sim", help="robot profile (default: %(default)s)")
-    parser.add_argument("--seed", type=int, default=0, help="seed of everything random (default: %(default)s)")
+    parser.add_argument("--seed", type=natural, default=0, help="seed of everything random (default: %(default)s)")
     parser.add_argument("--out", type=Path, help="checkpoint to write (default: the one that comes with the project)")
 
 
@@ -31,6 +32,10 @@ def run(args: argparse.Namespace) -> int:
 
     profile = load_profile(args.profile)
     path = args.out or shipped_path(args.expert, profile)
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise StorageError(f"cannot write {path}: {error.strerror}", "Choose another folder.") from error
     command = f"lira train-expert {args.expert} --profile {args.profile} --seed {args.seed}"
     passed = train_expert(args.expert, profile, args.seed, path, command)
     if not passed:

@@ -16,6 +16,8 @@ import threading
 import time
 from typing import TYPE_CHECKING
 
+from tools.arguments import natural
+
 if TYPE_CHECKING:
     from hal.bus import Bus
     from sim_backend.twin import Twin
@@ -37,8 +39,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="where drivers connect; 0.0.0.0:7447 lets other machines in (default: %(default)s, this machine only)",
     )
     add("--insecure", action="store_true", help="let other machines in without keys (see lira keys)")
-    add("--layout", type=int, default=0, help="which random layout of the world's boxes (default: %(default)s)")
-    add("--seed", type=int, default=0, help="seeds the sensors' noise (default: %(default)s)")
+    add("--layout", type=natural, default=0, help="which random layout of the world's boxes (default: %(default)s)")
+    add("--seed", type=natural, default=0, help="seeds the sensors' noise (default: %(default)s)")
     pace = parser.add_mutually_exclusive_group()
     pace.add_argument("--speed", type=float, default=1.0, metavar="X", help="times real time (default: %(default)g)")
     pace.add_argument("--lockstep", action="store_true", help="time passes only when the driver has answered")
