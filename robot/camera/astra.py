@@ -2,20 +2,34 @@
 
 import contextlib
 import time
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from openni import openni2
-from openni.utils import InitializationError, OpenNIError
+from openni.utils import ClosedHandle, InitializationError, OpenNIError
 
 from hal.errors import DeviceError
 from hal.messages import Image
 
+# A driver's own thread may still be at its last picture when the stream has stopped; to close it then crashes.
+SETTLE_S = 0.15
 INSTALL = (
     "Give the folder of Orbbec's OpenNI2 (with libOpenNI2.so and OpenNI2/Drivers in it) by --openni or OPENNI2_REDIST."
 )
 PLUG = "Is the Astra plugged in, and do Orbbec's udev rules let this user open it? See robot/README.md."
+
+
+class Device(openni2.Device):  # type: ignore[misc]
+    """A device that may fail to open: the package would close what was never opened, and crash."""
+
+    def _reopen(self) -> None:
+        try:
+            super()._reopen()
+        except OpenNIError:
+            self._handle = ClosedHandle
+            raise
 
 
 class OpenniSource:
@@ -26,7 +40,7 @@ class OpenniSource:
         self._stream: Any = None
         load(folder)
         try:
-            self._device = openni2.Device(uri.encode() or None)
+            self._device = Device(uri.encode() or None)
             self._stream = self._device.create_color_stream()
             if self._stream is None:
                 raise DeviceError(f"the OpenNI2 device {name_of(self._device)} has no colour", PLUG)
@@ -52,13 +66,21 @@ class OpenniSource:
         return Image(stamp_s, rows.reshape(frame.height, frame.width, 3).copy())
 
     def close(self) -> None:
-        """Let go of the camera."""
-        for part, end in ((self._stream, "stop"), (self._stream, "close"), (self._device, "close")):
-            if part is not None:
-                with contextlib.suppress(OpenNIError):  # a camera that is gone cannot be closed in good order
-                    getattr(part, end)()
-        self._stream = self._device = None
-        openni2.unload()
+        """Let go of the camera. The library stays loaded."""
+        stream, device, self._stream, self._device = self._stream, self._device, None, None
+        if stream is not None:
+            quietly(stream.stop)
+            time.sleep(SETTLE_S)
+            quietly(stream.close)
+            time.sleep(SETTLE_S)
+        if device is not None:
+            quietly(device.close)
+
+
+def quietly(end: Callable[[], object]) -> None:
+    """End something that may be gone already."""
+    with contextlib.suppress(OpenNIError):
+        end()
 
 
 def load(folder: Path | None) -> None:
