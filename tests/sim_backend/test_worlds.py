@@ -49,7 +49,8 @@ def test_every_world_that_comes_with_the_project_loads_and_builds(name):
 
 
 def test_the_worlds_of_the_thesis_are_there():
-    assert {"line", "forest", "line-obstacles", "race", "eight"} <= set(known_worlds())
+    wanted = {"line", "forest", "line-obstacles", "race", "eight", "eight-obstacles"}
+    assert wanted <= set(known_worlds())
 
 
 def test_a_users_world_is_loaded_by_its_path(tmp_path):
@@ -141,16 +142,36 @@ def test_the_race_has_21_boxes_on_and_beside_its_line(seed):
     assert ((np.abs(y) >= 0.5) & (np.abs(y) <= 1.0)).sum() == 8
 
 
+@pytest.mark.parametrize("name", ["line-obstacles", "eight-obstacles"])
 @pytest.mark.parametrize("seed", range(6))
-def test_the_obstacles_stand_on_the_line_well_apart(seed):
-    layout = build(load_world("line-obstacles"), seed)
+def test_the_obstacles_stand_on_the_line_well_apart(name, seed):
+    layout = build(load_world(name), seed)
     xy = np.array([(b.x_m, b.y_m) for b in layout.blocks])
     progress, lateral, _ = layout.curve.project(xy)
+    assert {block.gray for block in layout.blocks} == {0}
     assert 40.0 < layout.curve.length_m < 60.0
     assert 6 <= len(xy) <= 10
     assert (np.abs(lateral) <= 0.1 + 1e-3).all()
     gaps = np.diff(np.sort(progress), append=np.sort(progress)[0] + layout.curve.length_m)
     assert (gaps >= 4.0 - 0.05).all()
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_no_box_of_the_eight_stands_on_both_branches(seed):
+    layout = build(load_world("eight-obstacles"), seed)
+    crossing = layout.curve.pose(layout.curve.length_m / 2)
+    assert crossing[:2] == pytest.approx((0.0, 0.0), abs=0.02)
+    xy = np.array([(b.x_m, b.y_m) for b in layout.blocks])
+    assert np.hypot(*xy.T).min() > 1.9
+    apart = np.hypot(*(xy[:, None] - xy[None]).transpose(2, 0, 1))
+    assert apart[~np.eye(len(xy), dtype=bool)].min() > 2.0
+
+
+def test_the_eight_with_obstacles_has_the_line_of_the_eight():
+    plain, boxed = (build(load_world(name)).curve.points for name in ("eight", "eight-obstacles"))
+    extent = [np.ptp(points, axis=0) for points in (plain, boxed)]
+    assert extent[0] == pytest.approx(extent[1], abs=0.05)
+    assert len(plain) == len(boxed)
 
 
 def test_the_forest_grows_denser_and_leaves_gaps_and_the_start_free():
@@ -167,7 +188,7 @@ def test_the_forest_grows_denser_and_leaves_gaps_and_the_start_free():
 
 
 def test_lines_can_be_followed_at_one_metre_and_one_radian_a_second():
-    for name in ("line", "line-obstacles", "eight"):
+    for name in ("line", "line-obstacles", "eight", "eight-obstacles"):
         curve = build(load_world(name)).curve
         curvature = np.abs(np.diff(curve.headings)) / curve.step_m
         assert curvature.max() < 0.55, name
