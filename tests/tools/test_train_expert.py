@@ -1,0 +1,65 @@
+"""`lira train-expert` on a curriculum that takes seconds: the shipped experts show that the real ones are passed."""
+
+import signal
+
+import pytest
+import torch
+
+from fusion import curriculum
+from fusion.checkpoint import load_checkpoint
+from fusion.curriculum import CURRICULA, Curriculum
+from fusion.session import Drive
+from hal.messages import Episode
+from tools import cli
+
+
+@pytest.fixture(autouse=True)
+def _as_it_was():
+    threads, handler = torch.get_num_threads(), signal.getsignal(signal.SIGTERM)
+    yield
+    torch.set_num_threads(threads)
+    signal.signal(signal.SIGTERM, handler)
+
+
+@pytest.fixture
+def short(monkeypatch):
+    """Set a curriculum of one drive along a straight line."""
+
+    def install(limit_s, goal="stay"):
+        drives = (Drive(Episode(), limit_s, goal),)
+        short = Curriculum("straight", CURRICULA["camera"].teacher, drives, laps=2)
+        monkeypatch.setitem(curriculum.CURRICULA, "camera", short)
+
+    return install
+
+
+def test_an_expert_that_passes_is_saved_with_its_cruise_and_how_it_was_made(short, tmp_path, capsys):
+    short(8.0)
+    files = [tmp_path / "a folder" / name for name in ("one.safetensors", "two.safetensors")]
+    for file in files:
+        assert cli.main(["train-expert", "camera", "--seed", "3", "--out", str(file)]) == 0
+    network, checkpoint = load_checkpoint(files[0])
+    assert network.kind == checkpoint.kind == "camera"
+    assert checkpoint.provenance == "lira train-expert camera --profile thesis-sim --seed 3"
+    assert checkpoint.cruise[0] > 0.5
+    assert abs(checkpoint.cruise[1]) < 0.5
+    assert files[0].read_bytes() == files[1].read_bytes()  # one seed, one expert
+    assert "camera expert: " in capsys.readouterr().out
+
+
+def test_an_expert_that_fails_is_not_saved_and_the_old_one_stays(short, tmp_path, capsys):
+    short(8.0, "finish")  # which is 50 m away
+    path = tmp_path / "expert.safetensors"
+    path.write_bytes(b"the old one")
+    assert cli.main(["train-expert", "camera", "--out", str(path)]) == 2
+    assert capsys.readouterr().err.splitlines() == [
+        "lira train-expert: the expert did not pass its curriculum; nothing was saved",
+        "  Try another --seed.",
+    ]
+    assert path.read_bytes() == b"the old one"
+
+
+def test_a_place_that_cannot_be_written_is_named_before_the_training(tmp_path, capsys):
+    (tmp_path / "file").write_text("")
+    assert cli.main(["train-expert", "lidar", "--out", str(tmp_path / "file" / "expert.safetensors")]) == 2
+    assert "cannot write" in capsys.readouterr().err
