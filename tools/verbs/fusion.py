@@ -43,6 +43,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     what.add_argument("--method", choices=("lira", "hg-dagger"), help="learn: LIRA-SPF or HG-DAgger")
     add("--preset", choices=("hold", "thesis"), default="hold", help="LIRA-SPF's settings (default: %(default)s)")
     add(
+        "--start",
+        choices=("human", "experts"),
+        default="human",
+        help="LIRA-SPF: who drives before the first training step (default: %(default)s)",
+    )
+    add(
         "--teacher",
         choices=("none", "scripted", "perfect"),
         default="none",
@@ -181,9 +187,11 @@ def learn_from_script(args: argparse.Namespace, robot: "RemoteRobot") -> int:
 
 def lira_settings(args: argparse.Namespace) -> "LiraSettings | None":
     """Return LIRA-SPF's settings, or None for HG-DAgger."""
+    import msgspec
+
     from fusion.lira import PRESETS
 
-    return PRESETS[args.preset] if args.method == "lira" else None
+    return msgspec.structs.replace(PRESETS[args.preset], start=args.start) if args.method == "lira" else None
 
 
 def save(folder: Path, method: "LiraSpf | HgDagger", robot: "RemoteRobot", args: argparse.Namespace) -> None:
