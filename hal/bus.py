@@ -130,6 +130,9 @@ class Bus:
     in the background. With `keys` (default: those that LIRA_KEYS names) it is encrypted and authenticated both ways;
     without, it listens on this machine only, unless `insecure`.
 
+    Peers hear the robot, not one another. With `watch` a session hears what all of them say, through the robot and
+    over one link: for consoles and the like, not for driving; nobody there to connect to is a `BusError` then.
+
     Raises `BusError` if the port is taken, `ConfigError` for a bad name, endpoint or keys.
     """
 
@@ -141,6 +144,7 @@ class Bus:
         connect: str | None = None,
         keys: Keys | None = None,
         insecure: bool = False,
+        watch: bool = False,
     ) -> None:
         if not re.fullmatch(r"[A-Za-z][A-Za-z0-9_]*", robot):
             raise ConfigError(f"'{robot}' is no name for a robot", "Use letters, digits and underscores, as in ROS.")
@@ -154,7 +158,7 @@ class Bus:
                 f"without keys anybody who reaches {listen} could drive the robot",
                 "Make keys with: lira keys init keys; listen on 127.0.0.1; or say --insecure.",
             )
-        self._session = _open(robot, listen, connect, keys)
+        self._session = _open(robot, listen, connect, keys, watch)
 
     def publisher(self, topic: Topic[M], qos: Qos | None = None) -> Publisher[M]:
         """Declare a publisher; `qos` replaces the table's."""
@@ -252,11 +256,11 @@ class Bus:
         return f"{self.robot}/{key}"
 
 
-def _open(robot: str, listen: str | None, connect: str | None, keys: Keys | None) -> zenoh.Session:
+def _open(robot: str, listen: str | None, connect: str | None, keys: Keys | None, watch: bool) -> zenoh.Session:
     config = zenoh.Config()
     for key, value in {
-        # Both ends are peers: a client would use one link only.
-        "mode": "peer",
+        # Both ends are peers: a client would use one link only. What peers say is passed on to clients alone.
+        "mode": "client" if watch else "peer",
         "listen/endpoints": _links(listen, keys),
         "connect/endpoints": _links(connect, keys),
         "connect/timeout_ms": 0,
@@ -283,7 +287,9 @@ def _open(robot: str, listen: str | None, connect: str | None, keys: Keys | None
                 f"{listen} is already in use",
                 "Stop the other program (another robot?), or choose another port with --listen HOST:PORT.",
             ) from error
-        raise BusError(f"cannot open the bus at {listen or connect}: {reason}", "Check the address.") from error
+        raise BusError(
+            f"cannot open the bus at {listen or connect}: {reason}", "Check the address, and that the robot runs."
+        ) from error
 
 
 def _is_loopback(endpoint: str) -> bool:

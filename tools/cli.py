@@ -24,13 +24,22 @@ VERBS = {
     "fusion": Verb("tools.verbs.fusion", "the learner: reads sensors, decides, drives, trains (LIRA-SPF, HG-DAgger)"),
     "train-expert": Verb("tools.verbs.train_expert", "train the camera or the lidar expert"),
     "experiment": Verb("tools.verbs.experiment", "repeat an experiment of the thesis, with statistics"),
+    "joystick": Verb("tools.verbs.joystick", "drive by hand: a gamepad on this machine, straight to the robot"),
     "report": Verb("tools.verbs.report", "make the HTML page of a recorded run"),
     "keys": Verb("tools.verbs.keys", "make the keys that say who may drive a robot, and encrypt the bus"),
     "bench": Verb("tools.verbs.bench", "measure speed on this machine"),
 }
 
 # Packages that only a part of the installation has, and the extra that brings them.
-EXTRAS = {"pybullet": "sim", "joblib": "experiment", "torch": "learn", "safetensors": "learn", "cryptography": "keys"}
+EXTRAS = {
+    "pybullet": "sim",
+    "joblib": "experiment",
+    "torch": "learn",
+    "safetensors": "learn",
+    "evdev": "joystick",
+    "pygame": "console",
+    "cryptography": "keys",
+}
 
 EXIT_ERROR = 2
 EXIT_INTERRUPTED = 128 + signal.SIGINT

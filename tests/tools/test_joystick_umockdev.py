@@ -1,0 +1,267 @@
+"""The bridge on real evdev traffic: discovery, driving, unplug, return, freeze, second node, missing permission."""
+
+import itertools
+import os
+import sys
+import time
+
+import pytest
+from pad_bed import SONY, Bed, library
+
+from hal.bus import Bus
+from hal.estop import look_at_estop
+from hal.messages import STOP, Reason, Source
+from hal.topics import APPLIED, JOY, TELEOP
+from tools.bench import null_robot
+from tools.processes import ChildProcess, free_port, lira_command
+
+if library() is None:
+    pytest.skip("needs libumockdev (Debian package umockdev)", allow_module_level=True)
+
+PAD, MOTION = 5, 4
+NUMBERS = itertools.count()
+
+
+def wait_for(condition, why=lambda: "never happened", timeout_s=20.0):
+    deadline_s = time.monotonic() + timeout_s
+    while not condition():
+        assert time.monotonic() < deadline_s, why()
+        time.sleep(0.01)
+
+
+@pytest.fixture(scope="module")
+def address(tmp_path_factory):
+    name, endpoint = f"pad{os.getpid()}", f"127.0.0.1:{free_port()}"
+    command = [sys.executable, "-P", "-m", "tools.bench.null_robot", name, endpoint]
+    with ChildProcess("the robot", command, tmp_path_factory.mktemp("robot") / "log") as robot:
+        robot.wait_ready(null_robot.READY, 30.0)
+        yield name, endpoint
+
+
+@pytest.fixture(scope="module")
+def bus(address):
+    bus = Bus(address[0], connect=address[1], watch=True)
+    yield bus
+    bus.close()
+
+
+@pytest.fixture
+def bed(tmp_path):
+    bed = Bed(tmp_path)
+    yield bed
+    bed.close()
+
+
+class Watcher:
+    """What came over the bus, with its time of arrival."""
+
+    def __init__(self, bus, topic):
+        self._reader = bus.reader(topic, depth=256)
+        self._all = []
+
+    def all(self):
+        self._all += self._reader.poll()
+        return self._all
+
+    def last(self):
+        return self.all()[-1].message if self.all() else None
+
+
+class Rig:
+    def __init__(self, bed, bus, process):
+        self.bed, self.process = bed, process
+        self.applied, self.teleop, self.joy = Watcher(bus, APPLIED), Watcher(bus, TELEOP), Watcher(bus, JOY)
+
+    def says(self, words, times=1):
+        output = self.process.output
+        wait_for(lambda: output().count(words) >= times, lambda: f"{words!r} not in:\n{output()}")
+
+    def drives(self, linear_m_s):
+        def driving():
+            applied = self.applied.last()
+            by_hand = applied is not None and applied.source is Source.TELEOP
+            return by_hand and applied.twist.linear_m_s == pytest.approx(linear_m_s)
+
+        wait_for(driving, self.process.output)
+
+    def stands(self):
+        wait_for(lambda: (a := self.applied.last()) and a.twist == STOP, self.process.output)
+
+    def begin(self):
+        """Hold the dead-man with the stick at rest, then go."""
+        self.bed.key(PAD, "BTN_TL", 1)
+        self.says("you drive")
+        self.bed.axis(PAD, "ABS_Y", 0)
+        self.drives(0.5)
+
+    def let_go(self):
+        self.bed.axis(PAD, "ABS_Y", 128)
+        self.bed.key(PAD, "BTN_TL", 0)
+
+    def zeros_then_silence(self, released):
+        """After the last motion come zeros for half a second, and then nothing."""
+        time.sleep(1.0)
+        sent = self.teleop.all()
+        zeros = list(itertools.takewhile(lambda r: r.message == STOP, reversed(sent)))
+        assert 8 <= len(zeros) <= 18, self.process.output()
+        assert {r.attachment.released for r in zeros} == {released}
+        assert zeros[0].attachment.time_s - zeros[-1].attachment.time_s == pytest.approx(0.5, abs=0.15)
+        time.sleep(0.3)
+        assert len(self.teleop.all()) == len(sent)
+
+
+@pytest.fixture
+def start(bed, bus, address, tmp_path):
+    running = []
+
+    def start(*words, prefix=()):
+        command = lira_command("joystick", "--name", address[0], "--connect", address[1], *words)
+        process = ChildProcess("the bridge", [*prefix, *bed.environment, *command], tmp_path / f"{next(NUMBERS)}.log")
+        running.append(process)
+        return Rig(bed, bus, process)
+
+    yield start
+    for process in running:
+        process.stop()
+        assert "Traceback" not in process.output()
+
+
+@pytest.fixture
+def rig(bed, start):
+    bed.plug(3, "A keyboard", keys=list(range(1, 120)), uniq="")
+    bed.plug(MOTION, f"{SONY} Motion Sensors", motion=True)
+    bed.plug(PAD)
+    rig = start()
+    rig.says("ready: hold the dead-man")
+    return rig
+
+
+def test_the_pad_is_found_by_its_controls_and_drives(rig):
+    rig.says(f"pad: {SONY} (/dev/input/event5), with motion sensors")
+    rig.begin()
+    rig.bed.key(PAD, "BTN_TR", 1)
+    rig.drives(1.0)
+    rig.bed.axis(PAD, "ABS_X", 255)
+    wait_for(lambda: rig.applied.last().twist.angular_rad_s == pytest.approx(-1.0))
+    joy = rig.joy.last()
+    assert joy.axes[:2] == pytest.approx((-1.0, 1.0))
+    assert [i for i, pressed in enumerate(joy.buttons) if pressed] == [4, 5]
+    stamps = [received.attachment.time_s for received in rig.joy.all()]
+    rig.bed.key(PAD, "BTN_TL", 0)
+    rig.stands()
+    rig.zeros_then_silence(released=True)
+    rate_hz = (len(stamps) - 1) / (stamps[-1] - stamps[0])
+    assert 20.0 < rate_hz < 36.0
+
+
+def test_unplugged_it_stands_at_once_and_the_same_pad_takes_it_up_again(rig):
+    rig.begin()
+    rig.bed.unplug(PAD)
+    rig.bed.unplug(MOTION)
+    rig.stands()
+    rig.zeros_then_silence(released=False)
+    assert rig.applied.last().reason is Reason.STALE
+    # Another pad is not taken for it.
+    rig.bed.plug(6, "Another pad", uniq="99")
+    time.sleep(0.7)
+    rig.bed.key(6, "BTN_TL", 1)
+    rig.bed.axis(6, "ABS_Y", 0)
+    back = 8  # the kernel gives it another number
+    rig.bed.plug(7, f"{SONY} Motion Sensors", motion=True)
+    rig.bed.plug(back)
+    # The dead-man is still held when it comes back: nothing moves before it was let go.
+    rig.bed.key(back, "BTN_TL", 1)
+    rig.says("(/dev/input/event8), with motion sensors")
+    time.sleep(0.8)
+    assert rig.applied.last().twist == STOP
+    rig.bed.key(back, "BTN_TL", 0)
+    rig.says("ready: hold the dead-man", times=2)
+    rig.bed.key(back, "BTN_TL", 1)
+    rig.says("you drive", times=2)
+    rig.bed.axis(back, "ABS_Y", 0)
+    rig.drives(0.5)
+    assert "Another pad" not in rig.process.output()
+
+
+def test_a_frozen_pad_stands_and_drives_again_when_it_is_back(rig):
+    rig.begin()
+    rig.bed.freeze(MOTION)
+    rig.stands()
+    rig.says("the pad is frozen")
+    rig.zeros_then_silence(released=False)
+    joys = len(rig.joy.all())
+    time.sleep(0.2)
+    assert len(rig.joy.all()) == joys
+    rig.bed.thaw(MOTION)
+    rig.let_go()
+    rig.says("ready: hold the dead-man", times=2)
+    rig.bed.key(PAD, "BTN_TL", 1)
+    rig.says("you drive", times=2)
+
+
+def test_the_emergency_stop_and_its_release(rig, bus):
+    rig.begin()
+    rig.bed.key(PAD, "BTN_MODE", 1)
+    rig.says("emergency stop: the robot stands")
+    assert look_at_estop(bus).pressed
+    rig.bed.key(PAD, "BTN_MODE", 0)
+    rig.let_go()
+    rig.says("ready: hold the dead-man", times=2)
+    rig.bed.key(PAD, "BTN_START", 1)
+    rig.says("emergency stop released")
+    rig.bed.key(PAD, "BTN_START", 0)
+    assert not look_at_estop(bus).pressed
+    rig.bed.key(PAD, "BTN_TL", 1)
+    rig.says("you drive", times=2)
+    rig.bed.axis(PAD, "ABS_Y", 0)
+    rig.drives(0.5)
+
+
+def test_a_pad_that_is_switched_on_later_is_found(bed, start):
+    rig = start()
+    rig.says("no pad is there")
+    bed.plug(PAD)
+    rig.says(f"pad: {SONY} (/dev/input/event5)")
+    rig.says("nobody will notice if it freezes")
+    rig.says("ready: hold the dead-man")
+
+
+def test_a_pad_that_may_not_be_opened_is_named_with_the_remedy(bed, start):
+    bed.plug(PAD)
+    bed.forbid(PAD, 0)
+    root = ["setpriv", "--bounding-set=-dac_override,-dac_read_search"] if os.geteuid() == 0 else []
+    rig = start(prefix=root)
+    assert rig.process.wait(20.0) == 2
+    what, remedy = rig.process.output().splitlines()[-2:]
+    assert what == f"lira joystick: no permission to open {SONY} (/dev/input/event5)"
+    assert "60-lira-pad.rules" in remedy
+
+
+def test_a_device_that_is_no_pad_is_refused(bed, start):
+    bed.plug(MOTION, f"{SONY} Motion Sensors", motion=True)
+    rig = start("--device", "/dev/input/event4")
+    assert rig.process.wait(20.0) == 2
+    assert "does not have the controls" in rig.process.output()
+
+
+def test_learn_asks_and_writes_a_file_that_loads(bed, start, tmp_path):
+    bed.plug(PAD)
+    path = tmp_path / "mine.toml"
+    rig = start("--learn", str(path))
+    for words, name, value, rest in (
+        ("FORWARD", "ABS_Y", 0, 128), ("LEFT", "ABS_RX", 0, 128), ("DEAD-MAN", "BTN_TR", 1, 0),
+        ("TURBO", "BTN_TL", 1, 0), ("EMERGENCY STOP", "BTN_EAST", 1, 0), ("RELEASES", "BTN_NORTH", 1, 0),
+    ):  # fmt: skip
+        rig.says(f"{words}")
+        send = bed.axis if name.startswith("ABS") else bed.key
+        send(PAD, name, value)
+        rig.says(f"... {name}")
+        send(PAD, name, rest)
+    assert rig.process.wait(10.0) == 0
+    from tools.joystick.mapping import load_mapping
+
+    mapping = load_mapping(str(path))
+    assert (mapping.forward.axis, mapping.forward.inverted, mapping.turn.axis) == ("ABS_Y", True, "ABS_RX")
+    assert (mapping.dead_man, mapping.turbo, mapping.estop, mapping.release) == (
+        "BTN_TR", "BTN_TL", ("BTN_EAST",), "BTN_NORTH",
+    )  # fmt: skip

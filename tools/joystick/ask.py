@@ -1,0 +1,73 @@
+"""`lira joystick --learn`: ask for each control, watch the pad, write its file."""
+
+import select
+import time
+from pathlib import Path
+
+from hal.errors import DeviceError, StorageError
+from tools.joystick.learn import ASKS, moved_axis, pressed_button, to_toml
+from tools.joystick.mapping import Axis
+from tools.joystick.nodes import Node, is_any_pad, read_nodes
+from tools.joystick.pad import Pad
+from tools.joystick.stick import PadState
+
+ANSWER_S = 30.0
+LOOK_S = 0.1
+
+
+def learn(path: Path, device: str | None) -> int:
+    """Ask, and write the file. Raises `DeviceError` without a pad or an answer, `StorageError` for the file."""
+    if path.exists():
+        raise StorageError(f"{path} is already there", "Choose another file name.")
+    node = _find(device)
+    pad = Pad(node)
+    print(f"{node}: leave it at rest now", flush=True)
+    found: dict[str, Axis | str] = {}
+    try:
+        for ask in ASKS:
+            rest = pad.state
+            print(f"  {ask.words} ... ", end="", flush=True)
+            found[ask.key] = answer = _answer(pad, rest, is_axis=ask.is_axis, taken=list(found.values()))
+            print(answer.axis if isinstance(answer, Axis) else answer, flush=True)
+            _wait_for_rest(pad, rest, answer)
+    finally:
+        pad.close()
+    try:
+        path.write_text(to_toml(node.name, found, node.axes, node.buttons), encoding="utf-8")
+    except OSError as error:
+        raise StorageError(f"cannot write {path}: {error.strerror}", "Choose another file.") from error
+    print(f"written: {path}; use it with: lira joystick --pad {path}")
+    return 0
+
+
+def _find(device: str | None) -> Node:
+    nodes = [node for node in read_nodes() if is_any_pad(node) and device in (None, node.path)]
+    if not nodes:
+        raise DeviceError("no pad is there", "Plug one in, or press its PS button; see /proc/bus/input/devices.")
+    return nodes[0]
+
+
+def _answer(pad: Pad, rest: PadState, *, is_axis: bool, taken: list[Axis | str]) -> Axis | str:
+    names = [other.axis if isinstance(other, Axis) else other for other in taken]
+    deadline_s = time.monotonic() + ANSWER_S
+    while time.monotonic() < deadline_s:
+        for state in _look(pad):
+            answer = moved_axis(rest, state) if is_axis else pressed_button(rest, state)
+            if answer is not None and (answer.axis if isinstance(answer, Axis) else answer) not in names:
+                return answer
+    raise DeviceError("nothing was pressed", "Start again, and press one control at a time.")
+
+
+def _wait_for_rest(pad: Pad, rest: PadState, answer: Axis | str) -> None:
+    deadline_s = time.monotonic() + ANSWER_S
+    while time.monotonic() < deadline_s:
+        held = moved_axis(rest, pad.state) if isinstance(answer, Axis) else pressed_button(rest, pad.state)
+        if held is None:
+            return
+        _look(pad)
+    raise DeviceError("a control did not come back to rest", "Start again, and let go of each control.")
+
+
+def _look(pad: Pad) -> list[PadState]:
+    select.select(pad.fileno_list(), [], [], LOOK_S)
+    return pad.read()[0]

@@ -1,0 +1,188 @@
+"""The bridge's loop: read the pad, let the hand decide, send, keep time. No step of it waits for the network."""
+
+import select
+import threading
+import time
+from collections.abc import Callable
+
+from hal.errors import DeviceError
+from hal.messages import Applied, Reason
+from tools.joystick.freeze import FreezeWatch
+from tools.joystick.hand import Hand, Order, State
+from tools.joystick.mapping import Mapping
+from tools.joystick.nodes import choose, motion_of, read_nodes
+from tools.joystick.pad import Pad
+from tools.joystick.rumble import CALLS, Rumble, pattern_of
+from tools.joystick.stick import PadState
+from tools.joystick.wheel import Wheel
+
+RATE_HZ = 30.0
+SEARCH_S = 0.3
+STALL_S = 2.0 / RATE_HZ
+WORDS = {
+    State.LOCKED: "hands off: let go of the dead-man and centre the sticks to begin",
+    State.READY: "ready: hold the dead-man to drive",
+    State.DRIVING: "you drive",
+    State.RESTING: "you gave the wheel back",
+    State.HOLDING: "stopped: the robot stands until a hand comes back",
+}
+
+
+class Bridge:
+    """Connects one pad with one robot. `device` as in `nodes.choose`; `say` gets a line for a person now and then.
+
+    Raises `DeviceError` if the pad that is there cannot be opened; once running it keeps trying instead.
+    """
+
+    def __init__(
+        self, mapping: Mapping, wheel: Wheel, device: str | None = None, say: Callable[[str], None] = print
+    ) -> None:
+        self._mapping = mapping
+        self._wheel = wheel
+        self._wanted = device
+        self._say = say
+        self._hand = Hand(mapping)
+        self._rumble = Rumble()
+        self._watch = FreezeWatch()
+        self._awake_s = 0.0  # time without our own stalls: those are no silence of the pad
+        self._looked_s = self._due_s = self._search_s = time.monotonic()
+        self._identity: tuple[str, ...] | None = None
+        self._pad: Pad | None = None
+        self._sent = Order(None)
+        self._calls = 0
+        self._last_words = ""
+        self._find()
+        if self._pad is None:
+            self._tell("no pad is there: plug one in, or press its PS button")
+
+    def run(self, stop: threading.Event) -> None:
+        """Go on until `stop` is set; then let the robot stand if a hand was on the wheel."""
+        try:
+            while not stop.is_set():
+                self._step()
+        finally:
+            if self._sent.action is not None:
+                self._wheel.drive((0.0, 0.0), self._sent.released, time.monotonic())
+            if self._pad is not None:
+                self._pad.close()
+
+    def _step(self) -> None:
+        self._wait()
+        states = self._read()
+        now_s = time.monotonic()
+        for state in states:
+            self._order(state, now_s)
+        if now_s >= self._due_s:
+            self._due_s = max(self._due_s + 1.0 / RATE_HZ, now_s)
+            self._tick(now_s)
+
+    def _wait(self) -> None:
+        """Until the pad says something, or the next tick is due."""
+        left_s = max(0.0, self._due_s - time.monotonic())
+        select.select([] if self._pad is None else self._pad.fileno_list(), [], [], left_s)
+        now_s = time.monotonic()
+        self._awake_s += min(now_s - self._looked_s, STALL_S)
+        self._looked_s = now_s
+
+    def _read(self) -> list[PadState]:
+        if self._pad is None:
+            return []
+        try:
+            states, heard = self._pad.read()
+        except DeviceError as error:
+            self._lose(error.what)
+            return []
+        if heard:
+            self._watch.note(self._awake_s)
+        return states
+
+    def _tick(self, now_s: float) -> None:
+        applied = self._wheel.listen()
+        if self._pad is None and now_s >= self._search_s:
+            self._search()
+        self._order(None if self._pad is None else self._pad.state, now_s, tick=True)
+        if self._pad is not None and self._is_alive():
+            self._wheel.show(*_joy(self._pad.state, self._mapping), now_s)
+        self._feel(now_s)
+        self._explain(applied)
+
+    def _order(self, state: PadState | None, now_s: float, *, tick: bool = False) -> None:
+        """Let the hand decide. What changes who drives goes out at once, the rest at the tick."""
+        before = self._hand.state
+        watched = before in (State.DRIVING, State.LOCKED)
+        order = self._hand.update(state, now_s, not watched or self._is_alive())
+        if order.estop is not None:
+            self._wheel.estop(order.estop)
+        changed = self._hand.state is not before
+        if order.action is not None and (tick or changed):
+            self._wheel.drive(order.action, order.released, now_s)
+        self._sent = order
+        if changed:
+            if before is State.DRIVING and state is not None and not self._is_alive():
+                self._tell("the pad is frozen: it is connected and silent")
+            self._tell(WORDS[self._hand.state])
+
+    def _is_alive(self) -> bool:
+        """Whether the pad talks as a live one does; taken for granted where it cannot be told."""
+        if not self._mapping.freeze or self._pad is None or not self._pad.has_motion:
+            return True
+        return self._watch.is_alive(self._awake_s)
+
+    def _search(self) -> None:
+        self._search_s = time.monotonic() + SEARCH_S
+        try:
+            self._find()
+        except DeviceError as error:
+            self._tell(str(error))
+
+    def _find(self) -> None:
+        nodes = read_nodes()
+        if self._identity is not None:
+            nodes = [node for node in nodes if node.is_motion or node.identity == self._identity]
+        node = choose(nodes, self._mapping, self._wanted)
+        if node is None:
+            return
+        motion = motion_of(node, nodes)
+        self._pad = Pad(node, motion)
+        self._identity = node.identity
+        self._watch = FreezeWatch()
+        self._tell(f"pad: {node}" + ("" if motion is None else ", with motion sensors"))
+        if self._mapping.freeze and motion is None:
+            self._tell("its motion sensors are not there, so nobody will notice if it freezes")
+
+    def _lose(self, why: str) -> None:
+        assert self._pad is not None
+        self._pad.close()
+        self._pad = None
+        self._tell(why)
+        self._order(None, time.monotonic(), tick=True)
+
+    def _feel(self, now_s: float) -> None:
+        """Rumble for what was asked on `joy/feedback`, and for the learner's calls as they begin."""
+        for message in self._wheel.feedback():
+            self._rumble.play(pattern_of(message), now_s)
+        for decision in self._wheel.decisions():
+            if decision.calls > self._calls and decision.call in CALLS:
+                self._rumble.play(CALLS[decision.call], now_s)
+            self._calls = decision.calls
+        if self._pad is not None:
+            self._pad.motor.set(self._rumble.strength(now_s) or 0.0)
+
+    def _explain(self, applied: Applied | None) -> None:
+        """Say why the robot stands though a hand drives."""
+        if applied is None or self._hand.state is not State.DRIVING:
+            return
+        if applied.reason is Reason.NEUTRAL_FIRST:
+            self._tell("the robot waits: centre the sticks once")
+        elif applied.reason is Reason.ESTOP:
+            self._tell(f"the emergency stop is pressed: let go, then hold {self._mapping.release} to release it")
+
+    def _tell(self, words: str) -> None:
+        if words != self._last_words:
+            self._say(words)
+        self._last_words = words
+
+
+def _joy(state: PadState, mapping: Mapping) -> tuple[tuple[float, ...], tuple[int, ...]]:
+    """Axes with up and left positive, as ROS has them, and buttons."""
+    return tuple(-state.reads(name) for name in mapping.axes), tuple(int(state.holds(name)) for name in mapping.buttons)

@@ -1,0 +1,93 @@
+"""The bus side of the bridge: sends what the hand orders, listens to who drives and who calls.
+
+Commands go straight to the robot's governor, stamped on the robot's clock, and never wait for an answer.
+"""
+
+import threading
+from collections.abc import Callable
+
+from hal.bus import Bus
+from hal.clock import ClockEstimate
+from hal.desk import LOCKSTEP, info_from_json
+from hal.errors import BusError
+from hal.estop import press_estop, release_estop
+from hal.messages import Action, Applied, Bool, Decision, Joy, JoyFeedback, Twist
+from hal.profile import RobotProfile
+from hal.topics import APPLIED, DECISION, ESTOP, INFO, JOY, JOY_FEEDBACK, TELEOP
+
+DEPTH = 16
+
+
+class Wheel:
+    """One robot's wheel: commands go over `bus`; `watch`, a watching bus, hears who calls.
+
+    Raises `BusError` if no robot answers, or one in lockstep: nobody's hand is that fast.
+    """
+
+    def __init__(self, bus: Bus, watch: Bus, answer_s: float, say: Callable[[str], None] = print) -> None:
+        info = info_from_json(bus.ask(INFO, timeout_s=answer_s))
+        if info.mode == LOCKSTEP:
+            raise BusError("the robot runs in lockstep, which no hand can follow", "Start it without --lockstep.")
+        self.profile: RobotProfile = info.profile
+        self._bus = bus
+        self._say = say
+        self._teleop = bus.publisher(TELEOP)
+        self._joy = bus.publisher(JOY)
+        self._estop = bus.publisher(ESTOP)
+        self._results = bus.reader(APPLIED, DEPTH)
+        self._feedback = watch.reader(JOY_FEEDBACK, DEPTH)
+        self._decisions = watch.reader(DECISION)
+        self._clock = ClockEstimate()
+        self._epoch = -1
+
+    @property
+    def known(self) -> bool:
+        """Whether the robot has been heard, so that commands can be stamped on its clock."""
+        return self._clock.known
+
+    def listen(self) -> Applied | None:
+        """Follow the robot's clock. Returns the newest of what was applied since the last time."""
+        newest = None
+        for received in self._results.poll():
+            newest = received.message
+            if (sent := received.attachment) is None:
+                continue
+            if sent.epoch != self._epoch:
+                self._epoch = sent.epoch
+                self._clock.restart()
+            self._clock.note(sent.time_s, received.arrived_s)
+        return newest
+
+    def drive(self, action: Action, released: bool, local_s: float) -> None:
+        """Send one command; nothing before the robot was heard."""
+        if self._clock.known:
+            base = self.profile.base
+            twist = Twist(action[0] * base.max_linear_m_s, action[1] * base.max_angular_rad_s)
+            self._teleop.put(twist, self._clock.now(local_s), released=released)
+
+    def show(self, axes: tuple[float, ...], buttons: tuple[int, ...], local_s: float) -> None:
+        """Publish the pad on `joy`."""
+        if self._clock.known:
+            now_s = self._clock.now(local_s)
+            self._joy.put(Joy(now_s, axes, buttons), now_s)
+
+    def feedback(self) -> list[JoyFeedback]:
+        """What the pad was asked to do since the last time."""
+        return [received.message for received in self._feedback.poll()]
+
+    def decisions(self) -> list[Decision]:
+        """What the learner has decided since the last time, as far as it was heard."""
+        return [received.message for received in self._decisions.poll()]
+
+    def estop(self, pressed: bool) -> None:
+        """Press or release the emergency stop: at once on the topic, and by a query that waits aside for its answer."""
+        self._estop.put(Bool(pressed), 0.0)
+        threading.Thread(target=self._ask, args=(pressed,), name="estop", daemon=True).start()
+
+    def _ask(self, pressed: bool) -> None:
+        try:
+            state = press_estop(self._bus) if pressed else release_estop(self._bus)
+        except BusError as error:
+            self._say(f"EMERGENCY STOP NOT ACKNOWLEDGED: {error}" if pressed else f"not released: {error}")
+        else:
+            self._say("emergency stop: the robot stands" if state.pressed else "emergency stop released")

@@ -1,0 +1,71 @@
+"""Drive by hand: a gamepad on this machine, straight to the robot. Needs no screen.
+
+Hold the dead-man (L1) to drive with the left stick, turbo (R1) for full speed. PS or SELECT is the emergency stop;
+START, held for a second, releases it. Letting go of the dead-man gives the wheel back at once.
+
+examples:
+  lira joystick                                     the first pad that has the controls of a PS3 pad
+  lira joystick --device /dev/input/event5          this one
+  lira joystick --learn my-pad.toml                 write the file of another pad by being asked for each control
+  lira joystick --pad my-pad.toml
+  lira joystick --connect 192.168.1.20:7447         a robot on another machine
+"""
+
+import argparse
+import sys
+from pathlib import Path
+
+from hal.errors import DeviceError
+
+ANSWER_S = 10.0
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the arguments."""
+    add = parser.add_argument
+    add("--name", default="rosbot", help="the robot's name on the bus (default: %(default)s)")
+    add("--connect", default="127.0.0.1:7447", metavar="HOST:PORT", help="where the robot is (default: %(default)s)")
+    add("--pad", default="ps3", metavar="NAME|FILE", help="kind of pad by name or .toml file (default: %(default)s)")
+    add("--device", metavar="PATH", help="the pad's /dev/input/event* or a link to it (default: the first that fits)")
+    add("--learn", type=Path, metavar="FILE", help="ask for each control and write a new pad's file, then end")
+
+
+def run(args: argparse.Namespace) -> int:
+    """Bridge until told to stop."""
+    if not sys.platform.startswith("linux"):
+        raise DeviceError("gamepads are read through Linux's evdev", "Use `lira console`, which has a keyboard.")
+    from tools.joystick.mapping import load_mapping
+
+    mapping = load_mapping(args.pad)
+    import evdev  # noqa: F401 - missing, it is named before a robot is looked for
+
+    if args.learn is not None:
+        from tools.joystick.ask import learn
+
+        return learn(args.learn, args.device)
+
+    from hal.bus import Bus
+    from hal.server import stop_on_signal
+    from hal.topics import INFO
+    from tools.joystick.bridge import Bridge
+    from tools.joystick.wheel import Wheel
+
+    bus, watch = Bus(args.name, connect=args.connect), None
+    try:
+        with stop_on_signal() as stop:
+            bus.ask(INFO, timeout_s=ANSWER_S)
+            watch = Bus(args.name, connect=args.connect, watch=True)
+            wheel = Wheel(bus, watch, ANSWER_S, say)
+            bridge = Bridge(mapping, wheel, args.device, say)
+            say(f"joystick drives '{args.name}' at {args.connect}; stop with Ctrl-C")
+            bridge.run(stop)
+    finally:
+        for session in (bus, watch):
+            if session is not None:
+                session.close()
+    return 0
+
+
+def say(words: str) -> None:
+    """Print a line at once."""
+    print(words, flush=True)
