@@ -13,6 +13,7 @@ BOOT_TEXT = b"\x00\xffrosbot firmware 0.16.2\r\n" + bytes(range(0x80, 0xFF))
 BUFFER_SIZE = 512
 FRAME_S = 0.02  # a frame has to arrive within
 WATCHDOG_S = 1.0
+DRIVE_S = 0.1  # a target is repeated to the wheels, which may have a watchdog of their own
 ASK_TIME_S = 2.5
 GIVE_UP_S = 11.0  # without an answer to the question for the time
 POSE_S, SLOW_S, BATTERY_S = 0.05, 0.1, 0.4
@@ -82,6 +83,7 @@ class Core2Unit:
         self.motors = True
         self.target = STOP
         self._commanded_s = -math.inf
+        self._driven, self._drive_again_s = STOP, -math.inf
         self._clock_s: float | None = None  # the host's time less ours
         self._asked_s = self._answered_s = -math.inf
         self._due_s = dict.fromkeys(PUBLISHED, -math.inf)
@@ -107,7 +109,10 @@ class Core2Unit:
             return garbage if self._random.random() < 0.02 else b""
         if self.watchdog and now_s - self._commanded_s > WATCHDOG_S and self.target != STOP:
             self.target = STOP
-        self._drive(self.target if self.motors else STOP)
+        target = self.target if self.motors else STOP
+        if target != self._driven or now_s >= self._drive_again_s:
+            self._driven, self._drive_again_s = target, now_s + DRIVE_S
+            self._drive(target)
         if self.configured:
             self._keep_in_touch(now_s)
             self._publish(now_s)

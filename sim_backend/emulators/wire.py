@@ -100,6 +100,8 @@ class Wire:
             with self._lock:
                 if self._ends is not None:
                     self._exchange(*self._ends)
+                else:
+                    self._unit.emit(time.monotonic())  # it goes on without its cable
 
     def _exchange(self, master: int, slave: int) -> None:
         now_s = time.monotonic()

@@ -1,0 +1,175 @@
+"""The physical ROSbot 2.0: lidar, camera and base as one robot that stands while any of them is lost."""
+
+import threading
+import time
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any, TypeVar
+
+from hal.errors import ConfigError, DeviceError
+from hal.messages import STOP, Applied, Command, LaserScan, Observation, Reason, Source
+from hal.profile import RobotProfile
+from hal.senses import Stamped
+from hal.topics import BATTERY, CAMERA, IMU, ODOM, RANGES, SCAN, Topic
+from robot.camera.device import CameraDevice
+from robot.camera.source import Picture
+from robot.core2.device import Core2
+from robot.keeper import Keeper
+from robot.rplidar.device import RPLidar
+from robot.settings import Settings
+
+S = TypeVar("S", bound=Stamped)
+
+OPEN_S = 20.0  # a CORE2 boots for 2 s and may speak at three speeds
+BLIND_S = 0.5  # driven on no older scan than this
+
+
+@dataclass(frozen=True, slots=True)
+class Devices:
+    """Where the parts are. `lidar` and `camera` None: to be driven without it."""
+
+    base: str
+    lidar: str | None = None
+    camera: str | None = None
+    openni_folder: Path | None = None
+    settings: Settings = field(default_factory=Settings)
+
+
+class Rosbot:
+    """Implements `hal.port.Robot`. Its clock is the monotonic clock.
+
+    A device that is lost is opened again by itself; meanwhile, and until the first zero command afterwards, the wheels
+    stand, and `Applied.clamps` says why: "no_lidar", "no_camera", "no_base", "neutral_first".
+    """
+
+    def __init__(self, profile: RobotProfile, devices: Devices) -> None:
+        self._profile = profile
+        self._lock = threading.Lock()
+        self._scan: LaserScan | None = None
+        self._picture: Picture | None = None
+        self._newest: Observation | None = None
+        self._armed = False
+        self._open = False
+        self.base = Core2(devices.base, devices.settings.base, profile.control.robot_timeout_s)
+        self.lidar: RPLidar | None = None
+        self._keepers = {"base": Keeper("base", self.base.session)}
+        if devices.lidar is not None:
+            self.lidar = RPLidar(devices.lidar, profile.lidar, devices.settings.lidar, self._see_scan)
+            self._keepers["lidar"] = Keeper("lidar", self.lidar.session)
+        if devices.camera is not None:
+            camera = CameraDevice(devices.camera, profile.camera, self._see_picture, devices.openni_folder)
+            self._keepers["camera"] = Keeper("camera", camera.session)
+
+    @property
+    def profile(self) -> RobotProfile:
+        """The robot's profile."""
+        return self._profile
+
+    def open(self) -> None:
+        """Bring all devices up at once. Raises `DeviceError` for the first that is missing or wrong."""
+        for keeper in self._keepers.values():
+            keeper.start()
+        try:
+            for keeper in self._keepers.values():
+                keeper.wait_alive(OPEN_S)
+        except (DeviceError, ConfigError):
+            self.close()
+            raise
+        self._open = True
+
+    def read(self) -> Observation:
+        """Return the newest of every sensor; what is older than its topic allows is None."""
+        if not self._open:
+            raise DeviceError("the robot is not open", "Call open() first.")
+        now_s, readings, last = self.now(), self.base.readings, self._newest
+        picture = self._picture
+        ranges = (fresh_of(value, RANGES[name], now_s) for name, value in list(readings.ranges.items()))
+        observation = Observation(
+            0 if last is None else last.seq,
+            now_s,
+            scan=fresh_of(self._scan, SCAN, now_s),
+            image=picture if fresh_of(picture, CAMERA, now_s) is not None else None,
+            odom=fresh_of(readings.odom, ODOM, now_s),
+            imu=fresh_of(readings.imu, IMU, now_s),
+            battery=fresh_of(readings.battery, BATTERY, now_s),
+            ranges=tuple(value for value in ranges if value is not None),
+        )
+        if last is not None and same(observation, last):
+            return last
+        self._newest = replace(observation, seq=observation.seq + 1)
+        return self._newest
+
+    def drive(self, command: Command) -> Applied:
+        """Send a velocity to the base, or zero if the robot may not move."""
+        lost = self._lost()
+        twist, reason, clamps = command.twist, Reason.OK, lost
+        with self._lock:
+            if lost:
+                self._armed, twist, reason = False, STOP, Reason.STALE
+            elif not self._armed:
+                self._armed = command.twist == STOP
+                if not self._armed:
+                    twist, reason, clamps = STOP, Reason.NEUTRAL_FIRST, ("neutral_first",)
+        try:
+            self.base.drive(twist)
+        except ValueError:  # not finite
+            twist, reason = STOP, Reason.REFUSED
+            self.base.drive(STOP)
+        now_s = self.now()
+        source = command.source if reason is Reason.OK else Source.NONE
+        return Applied(twist, now_s, source, reason, clamps, command.answers, now_s - command.stamp_s)
+
+    def now(self) -> float:
+        """Seconds on the monotonic clock."""
+        return time.monotonic()
+
+    def wait(self, until_s: float) -> None:
+        """Sleep."""
+        time.sleep(max(until_s - time.monotonic(), 0.0))
+
+    def close(self) -> None:
+        """Stop the wheels, then the lidar, and let go of all. May be called twice."""
+        self._open = False
+        self.base.drive(STOP)
+        for keeper in self._keepers.values():
+            keeper.close()
+
+    def cut_motors(self, off: bool) -> None:
+        """Take the motors' power away in the firmware, or give it back: a second emergency stop."""
+        self.base.cut_motors(off)
+
+    def troubles(self) -> dict[str, str]:
+        """What is wrong with which device, each with its remedy; empty while all work."""
+        return {name.removeprefix("no_"): self._trouble(name.removeprefix("no_")) for name in self._lost()}
+
+    def _trouble(self, name: str) -> str:
+        failure = self._keepers[name].failure
+        return str(failure) if failure is not None else f"the {name} is silent. Check its power and plug."
+
+    def _lost(self) -> tuple[str, ...]:
+        """Which devices do not work now, as clamps."""
+        lost = [name for name, keeper in self._keepers.items() if not keeper.alive]
+        scan = self._scan
+        if "lidar" in self._keepers and "lidar" not in lost and (scan is None or self.now() - scan.stamp_s > BLIND_S):
+            lost.append("lidar")
+        if not self.base.answers and "base" not in lost:
+            lost.append("base")
+        return tuple(f"no_{name}" for name in lost)
+
+    def _see_scan(self, scan: LaserScan) -> None:
+        self._scan = scan
+
+    def _see_picture(self, picture: Picture) -> None:
+        self._picture = picture
+
+
+def fresh_of(value: S | None, topic: Topic[Any], now_s: float) -> S | None:
+    """Return the value unless it is older than its topic allows."""
+    return value if value is not None and now_s - value.stamp_s <= topic.max_age_s else None
+
+
+def same(one: Observation, other: Observation) -> bool:
+    """Whether two observations hold the very same readings."""
+    names = ("scan", "image", "odom", "imu", "battery")
+    mine, theirs = ([*(getattr(seen, name) for name in names), *seen.ranges] for seen in (one, other))
+    return len(mine) == len(theirs) and all(a is b for a, b in zip(mine, theirs, strict=True))
