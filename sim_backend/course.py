@@ -21,7 +21,7 @@ class Place:
 
 @dataclass(frozen=True, slots=True)
 class Obstacles:
-    """The boxes as arrays [boxes]: centre, half edges, direction of the length."""
+    """The boxes in the robot's way as arrays [boxes]: centre, half edges, direction of the length."""
 
     x_m: Floats
     y_m: Floats
@@ -32,8 +32,12 @@ class Obstacles:
 
     @staticmethod
     def of(blocks: tuple[Block, ...]) -> "Obstacles":
-        """Take what matters of the boxes."""
-        rows = [(b.x_m, b.y_m, b.length_m / 2, b.width_m / 2, math.cos(b.yaw_rad), math.sin(b.yaw_rad)) for b in blocks]
+        """Take what matters of the boxes; the robot drives below those that hang high enough."""
+        rows = [
+            (b.x_m, b.y_m, b.length_m / 2, b.width_m / 2, math.cos(b.yaw_rad), math.sin(b.yaw_rad))
+            for b in blocks
+            if b.in_the_way
+        ]
         return Obstacles(*np.array(rows, dtype=np.float64).reshape(-1, 6).T)
 
     def near(self, x_m: float, y_m: float, reach_m: float) -> "Obstacles":

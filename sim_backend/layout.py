@@ -13,13 +13,15 @@ DRAWN_STEP_M = 0.02
 # Nothing random stands nearer than this to the start, nothing at all nearer than a robot's size.
 CLEAR_OF_START_M = 2.0
 ROBOT_M = 0.3
+# What begins above the highest sensor of any robot is not in its way.
+ROBOT_HEIGHT_M = 0.30
 ATTEMPTS = 400
 TRIES_PER_X = 40
 
 
 @dataclass(frozen=True, slots=True)
 class Block:
-    """A box in SI units: centre on the floor, yaw, edges along its own axes, gray."""
+    """A box in SI units: centre on the floor, yaw, edges along its own axes, gray, free room below it."""
 
     x_m: float
     y_m: float
@@ -28,6 +30,12 @@ class Block:
     width_m: float
     height_m: float
     gray: int
+    bottom_m: float = 0.0
+
+    @property
+    def in_the_way(self) -> bool:
+        """Whether the robot would touch it: it begins below the top of the robot's sensors."""
+        return self.bottom_m < ROBOT_HEIGHT_M
 
 
 @dataclass(frozen=True, slots=True)
@@ -62,7 +70,7 @@ def check(world: World) -> None:
     layout = build(world)
     x, y, _ = layout.curve.pose(0.0)
     for number, block in enumerate(layout.blocks):
-        if distance_m(block, x, y) < ROBOT_M:
+        if block.in_the_way and distance_m(block, x, y) < ROBOT_M:
             raise ValueError(f"box {number + 1} at ({block.x_m:g}, {block.y_m:g}) stands on the start")
 
 
@@ -106,7 +114,11 @@ def draw_line(line: Line, start: Start) -> Floats:
 
 def to_block(box: Box) -> Block:
     """Leave degrees behind."""
-    return Block(box.x_m, box.y_m, math.radians(box.yaw_deg), box.length_m, box.width_m, box.height_m, box.gray)
+    return Block(
+        *(box.x_m, box.y_m, math.radians(box.yaw_deg)),
+        *(box.length_m, box.width_m, box.height_m),
+        *(box.gray, box.bottom_m),
+    )
 
 
 def cube(x_m: float, y_m: float, yaw_rad: float, size_m: float, gray: int) -> Block:

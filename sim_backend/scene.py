@@ -112,7 +112,7 @@ class Scene:
         bullet.resetSimulation(physicsClientId=self.client)
         # Or pybullet keeps every mesh file it has ever read.
         bullet.setPhysicsEngineParameter(enableFileCaching=0, physicsClientId=self.client)
-        if world.line is not None:
+        if world.line is not None and world.line.painted:
             self._draw(ribbon_mesh(layout.curve, world.line), world.line.gray)
         for gray in sorted({block.gray for block in layout.blocks}):
             alike = [block for block in layout.blocks if block.gray == gray]
@@ -134,7 +134,7 @@ class Scene:
         shape: int = self.bullet.createCollisionShapeArray(
             shapeTypes=[self.bullet.GEOM_BOX] * len(blocks),
             halfExtents=[[block.length_m / 2, block.width_m / 2, block.height_m / 2] for block in blocks],
-            collisionFramePositions=[[block.x_m, block.y_m, block.height_m / 2] for block in blocks],
+            collisionFramePositions=[[block.x_m, block.y_m, block.bottom_m + block.height_m / 2] for block in blocks],
             collisionFrameOrientations=[
                 [0.0, 0.0, math.sin(block.yaw_rad / 2), math.cos(block.yaw_rad / 2)] for block in blocks
             ],
@@ -176,7 +176,8 @@ def box_mesh(block: Block) -> Mesh:
     unit = np.array([(x, y, z) for x in (-0.5, 0.5) for y in (-0.5, 0.5) for z in (0.0, 1.0)])
     along, across, up = (unit * (block.length_m, block.width_m, block.height_m)).T
     cos, sin = math.cos(block.yaw_rad), math.sin(block.yaw_rad)
-    corners = np.stack([block.x_m + cos * along - sin * across, block.y_m + sin * along + cos * across, up], axis=-1)
+    x, y = block.x_m + cos * along - sin * across, block.y_m + sin * along + cos * across
+    corners = np.stack([x, y, block.bottom_m + up], axis=-1)
     faces = [(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3)]
     return corners, [index for a, b, c, d in faces for index in (a, b, c, a, c, d)]
 

@@ -57,17 +57,21 @@ class Piece(Table, frozen=True):
 
 
 class Line(Table, frozen=True):
-    """A line painted on the floor, beginning at `start`. `pieces` are laid end to end, `repeat` times."""
+    """The line to follow, beginning at `start`. `pieces` are laid end to end, `repeat` times.
+
+    One that is not `painted` cannot be seen: it tells teacher and referee the way where something else shows it.
+    """
 
     pieces: Annotated[tuple[Piece, ...], Meta(min_length=1)]
     repeat: Few = 1
     closed: bool = False
     width_m: Size = 0.1
     gray: Gray = 0
+    painted: bool = True
 
 
 class Box(Table, frozen=True):
-    """A box standing on the floor."""
+    """A box with its sides upright. It stands on the floor, or has `bottom_m` of free room below it."""
 
     x_m: Metres
     y_m: Metres
@@ -75,6 +79,7 @@ class Box(Table, frozen=True):
     length_m: Size = 0.45
     width_m: Size = 0.45
     height_m: Size = 0.45
+    bottom_m: Gap = 0.0
     gray: Gray = 0
 
 

@@ -2,12 +2,15 @@ import math
 import re
 from pathlib import Path
 
+import cv2
+import msgspec
 import numpy as np
 import pytest
 
 import sim_backend
 from hal.errors import ConfigError
 from sim_backend.catalogue import known_worlds, load_world
+from sim_backend.course import Course
 from sim_backend.layout import build, distance_m
 
 OVAL = """
@@ -49,7 +52,7 @@ def test_every_world_that_comes_with_the_project_loads_and_builds(name):
 
 
 def test_the_worlds_of_the_thesis_are_there():
-    wanted = {"line", "forest", "line-obstacles", "race", "eight", "eight-obstacles"}
+    wanted = {"line", "forest", "line-obstacles", "race", "eight", "eight-obstacles", "passage", "passage-train"}
     assert wanted <= set(known_worlds())
 
 
@@ -172,6 +175,42 @@ def test_the_eight_with_obstacles_has_the_line_of_the_eight():
     extent = [np.ptp(points, axis=0) for points in (plain, boxed)]
     assert extent[0] == pytest.approx(extent[1], abs=0.05)
     assert len(plain) == len(boxed)
+
+
+@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("name", ["passage", "passage-train"])
+def test_there_is_a_way_through_near_the_line(name, seed):
+    layout = build(load_world(name), seed)
+    assert reachable_m(Course(layout, 0.154)) >= layout.world.limits.finish_m
+
+
+def test_the_passage_is_the_shortest_way_for_the_lidar_alone():
+    world = load_world("passage")
+    layout = build(world)
+    (lintel,) = (block for block in layout.blocks if block.bottom_m)
+    assert lintel.in_the_way
+    gap = np.array([lintel.x_m, lintel.y_m])
+    course = Course(layout, 0.154)
+    assert course.clearance(gap) < 0.0
+    lidars = tuple(box for box in world.box if not box.bottom_m)
+    assert Course(build(msgspec.structs.replace(world, box=lidars)), 0.154).clearance(gap) > 0.1
+    right = min(block.y_m - block.width_m / 2 for block in layout.blocks)
+    assert abs(lintel.y_m) < abs(right)
+
+
+def reachable_m(course, lateral_m=1.2):
+    """How far along the line the robot can come without touching a box or going farther than this from the line."""
+    step_m = 0.05
+    points = course.layout.curve.points
+    axes = [np.arange(low, high, step_m) for low, high in zip(points.min(0) - 2, points.max(0) + 2, strict=True)]
+    xy = np.stack(np.meshgrid(*axes), axis=-1)
+    place = course.place(xy.reshape(-1, 2), np.zeros(xy[..., 0].size))
+    near = np.abs(place.lateral_m.reshape(xy.shape[:2])) < lateral_m
+    free = near & (course.clearance(xy) > step_m)
+    _, parts = cv2.connectedComponents(free.astype(np.uint8), connectivity=4)
+    start = parts[np.abs(xy - points[0]).sum(-1) < 0.1][0]
+    assert start > 0
+    return place.progress_m.reshape(parts.shape)[parts == start].max()
 
 
 def test_the_forest_grows_denser_and_leaves_gaps_and_the_start_free():
