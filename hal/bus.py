@@ -28,6 +28,7 @@ M = TypeVar("M")
 DEFAULT_ROBOT = "rosbot"
 DEFAULT_ENDPOINT = "127.0.0.1:7447"
 LEASE_MS = 2000
+OPEN_MS = 2000
 QUERY_PAUSE_S = 0.1
 POLL_S = 0.0005
 
@@ -179,6 +180,16 @@ class Bus:
             publisher = self._session.declare_publisher(self._key(topic.key), **options)
         return Publisher(publisher, self.epoch)
 
+    def put_raw(self, topic: Topic[Any], payload: bytes, attachment: bytes | None = None) -> None:
+        """Send bytes as they are: for relays, recorders and tests of what a bus has to bear."""
+        self._session.put(
+            self._key(topic.key),
+            payload,
+            attachment=attachment,
+            priority=topic.qos.priority,
+            congestion_control=zenoh.CongestionControl.DROP,
+        )
+
     def reader(self, topic: Topic[M], depth: int = 1) -> Reader[M]:
         """Declare a reader that keeps the newest `depth` messages between polls."""
         ring: RingChannel[zenoh.Sample] = RingChannel(depth)
@@ -269,6 +280,8 @@ def _open(robot: str, listen: str | None, connect: str | None, keys: Keys | None
         "scouting/multicast/enabled": False,
         "scouting/gossip/enabled": False,
         "transport/unicast/max_links": 2,
+        # Whoever has no keys for a robot that wants some hears it after this long.
+        "transport/unicast/open_timeout": OPEN_MS,
         "transport/link/tx/lease": LEASE_MS,
         # It can lose a message when a receiver stalls.
         "transport/shared_memory/enabled": False,

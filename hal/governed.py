@@ -114,4 +114,9 @@ class GovernedRobot:
     def _actuate(self) -> Applied:
         allowed = self._governor.tick(self._robot.now())
         got = self._robot.drive(Command(allowed.twist, allowed.stamp_s, allowed.source, allowed.answers))
+        if self._robot.now() - allowed.stamp_s > self.profile.control.robot_timeout_s:
+            # The base hung on it: what it took in the end is old by now.
+            self._governor.halt()
+            allowed = self._governor.tick(self._robot.now())
+            got = self._robot.drive(Command(allowed.twist, allowed.stamp_s))
         return replace(allowed, twist=got.twist, clamps=allowed.clamps + got.clamps)

@@ -7,13 +7,15 @@ one time-out later. A person's hand is not a decision (it answers no observation
 its own stamp and never repeated.
 """
 
+import math
 import threading
 import time
 
 from hal.bus import Bus, Publisher
 from hal.clock import ClockEstimate
 from hal.errors import BusError
-from hal.messages import STOP, Applied, Command, CourseState, Observation, Source, Twist
+from hal.governor import is_neutral
+from hal.messages import STOP, Applied, Command, CourseState, Observation, Reason, Source, Twist
 from hal.senses import Sense, Senses
 from hal.topics import APPLIED, CMD_VEL, SIM_STATE, TELEOP
 
@@ -28,9 +30,10 @@ FAREWELL = 3  # neutral commands at the end: one may be lost
 
 
 class RealTimeLink:
-    """Talks to a robot whose time passes by itself."""
+    """Talks to a robot whose time passes by itself, and that stops when policy is silent for `patience_s`."""
 
-    def __init__(self, bus: Bus) -> None:
+    def __init__(self, bus: Bus, patience_s: float) -> None:
+        self._patience_s = patience_s
         self._senses = Senses(bus)
         self._states = Sense(bus, SIM_STATE)
         self._results = bus.reader(APPLIED, depth=16)
@@ -82,11 +85,15 @@ class RealTimeLink:
     def drive(self, command: Command) -> Applied:
         """Send a command and wait a moment for what the robot says it applied on it.
 
-        Returns what it said last if that does not come in time, a stop if it has not said anything lately.
+        Returns what it said last if that does not come in time, a stop if it has not said anything lately. A neutral
+        decision is not sent while the robot may have stopped by itself without a word here: it would arm the robot,
+        and nobody has decided that.
         """
         decided = command.source is Source.POLICY or command.answers >= 0
         with self._heard:
             now_s = self._clock.now(time.monotonic())
+            if decided and self._would_arm_blindly(now_s, command):
+                return Applied(STOP, now_s, reason=Reason.STALE)
             if decided:
                 self._held[command.source] = command
                 self._send_held(now_s, command)
@@ -142,9 +149,17 @@ class RealTimeLink:
             for command in list(self._held.values()):
                 self._send_held(now_s, command)
 
+    def _would_arm_blindly(self, now_s: float, command: Command) -> bool:
+        """Whether this is neutral, and the robot may have lost patience since it was last heard."""
+        newest = self._newest
+        if newest is None or command.released or not is_neutral(command.twist):
+            return False
+        age_s = 0.0 if math.isnan(newest.command_age_s) else newest.command_age_s
+        return now_s - newest.stamp_s + age_s > self._patience_s
+
     def _send_held(self, now_s: float, command: Command) -> None:
         """Send a decision with the time of sending; let go of it when it is too old."""
-        if now_s - command.stamp_s > DECISION_S:
+        if now_s - command.stamp_s > DECISION_S or self._would_arm_blindly(now_s, command):
             del self._held[command.source]
         else:
             _put(self._publishers[command.source], command, now_s)

@@ -27,6 +27,7 @@ VERBS = {
     "joystick": Verb("tools.verbs.joystick", "drive by hand: a gamepad on this machine, straight to the robot"),
     "report": Verb("tools.verbs.report", "make the HTML page of a recorded run"),
     "keys": Verb("tools.verbs.keys", "make the keys that say who may drive a robot, and encrypt the bus"),
+    "stop-test": Verb("tools.verbs.stop_test", "break things while a robot drives, and measure how soon it stands"),
     "bench": Verb("tools.verbs.bench", "measure speed on this machine"),
 }
 

@@ -1,0 +1,180 @@
+"""A relay between a robot and its driver, in user space, TCP and UDP on one port: it can fail like a bad link.
+
+Change `faults` at any time, from any thread. While `dark`, datagrams are lost, and streams held and delivered late, as
+TCP does; `delay_s` holds everything back, `copies` sends every datagram more than once, `swap` exchanges neighbours.
+"""
+
+import asyncio
+import contextlib
+import threading
+from collections.abc import Callable, Coroutine
+from dataclasses import dataclass
+from typing import Any, cast
+
+CHUNK = 65536
+LOOK_S = 0.01
+READY_S = 5.0
+
+
+@dataclass(slots=True)
+class LinkFaults:
+    """What is wrong with the link now."""
+
+    dark: bool = False
+    delay_s: float = 0.0
+    copies: int = 1
+    swap: bool = False
+
+
+class Relay:
+    """Listens on `port` of this machine and passes everything to `target_port`. Leaving its `with` block ends it."""
+
+    def __init__(self, port: int, target_port: int) -> None:
+        self.faults = LinkFaults()
+        self._ports = port, target_port
+        self._loop = asyncio.new_event_loop()
+        self._ready = threading.Event()
+        self._streams: set[asyncio.StreamWriter] = set()
+        self._datagrams: list[asyncio.BaseTransport] = []
+        self._tasks: set[asyncio.Task[None]] = set()
+        self._thread = threading.Thread(target=self._run, name="relay", daemon=True)
+
+    def __enter__(self) -> "Relay":
+        self._thread.start()
+        if not self._ready.wait(READY_S):
+            raise TimeoutError("the relay does not start")
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._loop.call_soon_threadsafe(self._loop.stop)
+        self._thread.join()
+
+    def cut(self) -> None:
+        """Break every stream that is open."""
+        self._loop.call_soon_threadsafe(self._abort)
+
+    def _abort(self) -> None:
+        for stream in self._streams:
+            stream.transport.abort()
+
+    def _run(self) -> None:
+        asyncio.set_event_loop(self._loop)
+        server = self._loop.run_until_complete(self._open())
+        self._ready.set()
+        self._loop.run_forever()
+        server.close()
+        self._abort()
+        for transport in self._datagrams:
+            transport.close()
+        for task in self._tasks:
+            task.cancel()
+        self._loop.run_until_complete(asyncio.gather(*self._tasks, return_exceptions=True))
+        self._loop.run_until_complete(asyncio.sleep(0))  # what was closed is let go of on the loop's next turn
+        self._loop.run_until_complete(self._loop.shutdown_asyncgens())
+        self._loop.close()
+
+    async def _open(self) -> asyncio.Server:
+        port, target_port = self._ports
+        await self._loop.create_datagram_endpoint(lambda: _Front(self, target_port), local_addr=("127.0.0.1", port))
+        return await asyncio.start_server(self._accept, "127.0.0.1", port)
+
+    async def _accept(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+        try:
+            far_reader, far_writer = await asyncio.open_connection("127.0.0.1", self._ports[1])
+        except OSError:
+            writer.close()
+            return
+        self.start(self._pump(reader, far_writer))
+        self.start(self._pump(far_reader, writer))
+
+    def keep(self, transport: asyncio.BaseTransport) -> None:
+        """Close a transport with the relay."""
+        self._datagrams.append(transport)
+
+    def start(self, work: Coroutine[Any, Any, None]) -> None:
+        """Run something until it ends or the relay does."""
+        task = self._loop.create_task(work)
+        self._tasks.add(task)
+        task.add_done_callback(self._tasks.discard)
+
+    async def _pump(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+        self._streams.add(writer)
+        try:
+            while data := await reader.read(CHUNK):
+                await asyncio.sleep(self.faults.delay_s)
+                while self.faults.dark:
+                    await asyncio.sleep(LOOK_S)
+                writer.write(data)
+                await writer.drain()
+        except OSError:
+            pass  # the other side is gone: so is this one
+        finally:
+            self._streams.discard(writer)
+            with contextlib.suppress(RuntimeError):  # the loop may be closed already
+                writer.close()
+
+
+class _Front(asyncio.DatagramProtocol):
+    """Faces the driver: one far socket for each of its addresses."""
+
+    def __init__(self, relay: Relay, target_port: int) -> None:
+        self._relay = relay
+        self._target_port = target_port
+        self._far: dict[tuple[str, int], _Sender] = {}
+
+    def connection_made(self, transport: asyncio.BaseTransport) -> None:
+        self._relay.keep(transport)
+        self._near = cast(asyncio.DatagramTransport, transport)  # it is one, if not by inheritance
+
+    def datagram_received(self, data: bytes, addr: tuple[str, int]) -> None:
+        if addr not in self._far:
+            self._far[addr] = _Sender(self._relay.faults)
+            self._relay.start(self._connect(addr, data))
+        else:
+            self._far[addr].send(data)
+
+    async def _connect(self, addr: tuple[str, int], first: bytes) -> None:
+        loop = asyncio.get_running_loop()
+        back = _Sender(self._relay.faults)
+        back.open(lambda data: self._near.sendto(data, addr))
+        there, _ = await loop.create_datagram_endpoint(
+            lambda: _Back(back), remote_addr=("127.0.0.1", self._target_port)
+        )
+        self._relay.keep(there)
+        self._far[addr].open(there.sendto)
+        self._far[addr].send(first)
+
+
+class _Back(asyncio.DatagramProtocol):
+    """Faces the robot."""
+
+    def __init__(self, sender: "_Sender") -> None:
+        self._sender = sender
+
+    def datagram_received(self, data: bytes, addr: tuple[str, int]) -> None:  # noqa: ARG002 - asyncio's
+        self._sender.send(data)
+
+
+class _Sender:
+    """Sends datagrams one way, as badly as asked."""
+
+    def __init__(self, faults: LinkFaults) -> None:
+        self._faults = faults
+        self._put: Callable[[bytes], None] | None = None
+        self._held: bytes | None = None
+
+    def open(self, put: Callable[[bytes], None]) -> None:
+        self._put = put
+
+    def send(self, data: bytes) -> None:
+        faults = self._faults
+        if faults.dark or self._put is None:
+            return
+        if faults.swap and self._held is None:
+            self._held = data
+            return
+        for one in (data, self._held):
+            if one is not None:
+                for _ in range(faults.copies):
+                    asyncio.get_running_loop().call_later(faults.delay_s, self._put, one)
+        self._held = None

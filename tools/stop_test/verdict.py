@@ -1,0 +1,90 @@
+"""What a trial's journal says: how soon it stood, how far it went, what it obeyed, and whether it moved again. Pure."""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from hal.profile import RobotProfile
+from tools.stop_test.journal import Given, Truth
+
+Row = dict[str, str | float | int | bool]
+STILL_M_S = 1e-6
+TICK_S = 0.02  # the watchdog may look this much after the time-out
+
+
+@dataclass(frozen=True, slots=True)
+class Verdict:
+    """One trial. `zero_s` counts from the last command that was obeyed until the wheels got zero, inf if never."""
+
+    zero_s: float
+    distance_m: float
+    stale_obeyed: int
+    moved_unasked: bool
+    refused: int = 0  # commands
+
+
+def judge(
+    given: Sequence[Given],
+    truth: Sequence[Truth],
+    broken_s: float,
+    end_s: float,
+    profile: RobotProfile,
+    *,
+    frozen: bool = False,
+) -> Verdict:
+    """Judge what was noted from the fault on. The wheels have zero when told so, or when the body stands by itself.
+
+    `frozen`: nothing could be noted in between, so the time is that of the way at full speed.
+    """
+    after = [one for one in given if one.time_s >= broken_s]
+    moving = [one for one in after if one.moving] or [one for one in given if one.moving][-1:]
+    if not moving:
+        return Verdict(math.inf, 0.0, 0, moved_unasked=False)
+    first_zero_s = next((one.time_s for one in after if not one.moving), math.inf)
+    stood_s = next((one.time_s for one in truth if one.time_s >= broken_s and _still(one)), math.inf)
+    zero_at_s = min(first_zero_s, stood_s)
+    obeyed = [one for one in given if one.moving and one.time_s <= zero_at_s]
+    last_command_s = max((one.time_s - one.age_s for one in obeyed), default=broken_s)
+    again = [one for one in after if one.moving and one.time_s > zero_at_s]
+    limit_s = profile.control.policy_timeout_s + TICK_S
+    distance_m = _path_m([one for one in truth if last_command_s <= one.time_s <= end_s])
+    zero_s = distance_m / profile.base.max_linear_m_s if frozen else max(zero_at_s - last_command_s, 0.0)
+    return Verdict(
+        zero_s=zero_s,
+        distance_m=distance_m,
+        stale_obeyed=sum(one.age_s > limit_s for one in after if one.moving),
+        moved_unasked=bool(again),
+    )
+
+
+def _still(one: Truth) -> bool:
+    return abs(one.speed_m_s) < STILL_M_S
+
+
+def _path_m(points: Sequence[Truth]) -> float:
+    """Length of the way from the first point until it stands."""
+    xy = np.array([(one.x_m, one.y_m) for one in points]).reshape(-1, 2)
+    return float(np.hypot(*np.diff(xy, axis=0).T).sum()) if len(xy) > 1 else 0.0
+
+
+def summarize(fault: str, stopped_by: str, verdicts: Sequence[Verdict], budget_s: float) -> Row:
+    """Sum the trials of one fault up, in the columns of the issue."""
+    zeros_s = [one.zero_s for one in verdicts]
+    worst_s = max(zeros_s)
+    stale, moved = sum(one.stale_obeyed for one in verdicts), any(one.moved_unasked for one in verdicts)
+    return {
+        "fault": fault,
+        "n": len(verdicts),
+        "p50_s": float(np.percentile(zeros_s, 50)) if math.isfinite(worst_s) else math.inf,
+        "p99_s": float(np.percentile(zeros_s, 99)) if math.isfinite(worst_s) else math.inf,
+        "max_time_to_zero_s": worst_s,
+        "distance_m": max(one.distance_m for one in verdicts),
+        "stale_obeyed": stale,
+        "moved_unasked": moved,
+        "refused": sum(one.refused for one in verdicts),
+        "stopped_by": stopped_by,
+        "budget_s": budget_s,
+        "passed": worst_s <= budget_s and stale == 0 and not moved,
+    }
