@@ -21,6 +21,7 @@ class Verb(NamedTuple):
 VERBS = {
     "demo": Verb("tools.verbs.demo", "teach a robot in the digital twin, from start to report, in minutes"),
     "twin": Verb("tools.verbs.twin", "the digital twin: a simulated ROSbot on the bus"),
+    "robot": Verb("tools.verbs.robot", "the physical ROSbot: opens its lidar, camera and base, and puts it on the bus"),
     "fusion": Verb("tools.verbs.fusion", "the learner: reads sensors, decides, drives, trains (LIRA-SPF, HG-DAgger)"),
     "train-expert": Verb("tools.verbs.train_expert", "train the camera or the lidar expert"),
     "experiment": Verb("tools.verbs.experiment", "repeat an experiment of the thesis, with statistics"),
@@ -34,6 +35,8 @@ VERBS = {
 # Packages that only a part of the installation has, and the extra that brings them.
 EXTRAS = {
     "pybullet": "sim",
+    "serial": "robot",
+    "openni": "robot",
     "joblib": "experiment",
     "torch": "learn",
     "safetensors": "learn",

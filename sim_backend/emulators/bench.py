@@ -2,13 +2,14 @@
 
 import math
 import threading
+import time
 from pathlib import Path
 
 import cv2
 import numpy as np
 
 from hal.errors import DeviceError
-from hal.messages import Command, CompressedImage, Image, LaserScan, Odometry, Twist
+from hal.messages import Command, CompressedImage, CourseState, Episode, Image, LaserScan, Odometry, Twist
 from sim_backend.emulators.camera import MjpegServer
 from sim_backend.emulators.core2 import Core2Unit, Firmware
 from sim_backend.emulators.rplidar import Model, RplidarUnit
@@ -18,6 +19,7 @@ from sim_backend.twin import Twin
 
 LOOK_S = 0.01
 OPEN_S = 30.0
+RESET_S = 0.25  # two turns of the lidar and a bit
 JOIN_S = 5.0
 QUALITY = 95
 
@@ -25,7 +27,7 @@ QUALITY = 95
 class WiredTwin:
     """Opens a twin that runs in real time, and offers `folder/rplidar`, `folder/core2` and an MJPEG camera at `url`.
 
-    Raises `DeviceError` where the folder does not take them.
+    Implements `hal.port.Arena`. Raises `DeviceError` where the folder does not take them.
     """
 
     def __init__(
@@ -54,6 +56,15 @@ class WiredTwin:
             self.close()
             raise
         self.lidar_wire, self.base_wire = self._wires
+
+    def reset(self, episode: Episode) -> None:
+        """Put the robot down anew, and wait until what its devices send belongs to the new episode."""
+        self.twin.reset(episode)
+        time.sleep(RESET_S)
+
+    def state(self) -> CourseState:
+        """Ground truth now."""
+        return self.twin.state()
 
     def close(self) -> None:
         """Unplug everything and close the twin. May be called twice."""

@@ -6,6 +6,8 @@ import uuid
 from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass
+from pathlib import Path
+from tempfile import TemporaryDirectory
 
 from hal.bus import Bus
 from hal.governed import GovernedRobot
@@ -14,6 +16,10 @@ from hal.port import Arena, Robot
 from hal.profile import load_profile
 from hal.remote import RemoteArena, RemoteRobot
 from hal.server import HalServer
+from robot.rosbot import Devices, Rosbot
+from robot.settings import BaseSettings, LidarSettings, Settings
+from sim_backend.emulators.bench import WiredTwin
+from sim_backend.emulators.core2 import Firmware
 from sim_backend.twin import Twin
 from tools.processes import free_port
 
@@ -100,8 +106,26 @@ def twin_lockstep() -> Iterator[Rig]:
         yield rig
 
 
+WIRED = Settings(lidar=LidarSettings(spin_up_s=0.0), base=BaseSettings(boot_s=0.1))
+
+
+@contextmanager
+def rosbot_on_emulators() -> Iterator[Rig]:
+    with TemporaryDirectory() as name:
+        folder = Path(name)
+        wired = WiredTwin(make_twin(1.0), folder, firmware=Firmware(boot_s=0.05))
+        devices = Devices(str(folder / "core2"), str(folder / "rplidar"), wired.url, settings=WIRED)
+        robot = GovernedRobot(Rosbot(PROFILE, devices))
+        try:
+            robot.open()
+            yield Rig(robot, wired, real_time=True)
+        finally:
+            robot.close()
+            wired.close()
+
+
 # `real_time` and `stepped` robots by name: some promises make no sense for them.
-REAL_TIME = {"null over zenoh", "twin over zenoh"}
+REAL_TIME = {"null over zenoh", "twin over zenoh", "rosbot on emulators"}
 STEPPED = {"null over zenoh in lockstep", "twin over zenoh in lockstep"}
 
 ROBOTS: dict[str, Callable[[], AbstractContextManager[Rig]]] = {
@@ -111,4 +135,5 @@ ROBOTS: dict[str, Callable[[], AbstractContextManager[Rig]]] = {
     "twin": twin,
     "twin over zenoh": twin_real_time,
     "twin over zenoh in lockstep": twin_lockstep,
+    "rosbot on emulators": rosbot_on_emulators,
 }

@@ -8,19 +8,23 @@ examples:
   lira twin --world race --layout 7           another world, another layout of its boxes
   lira twin --world my-track.toml             a world of your own: copy one of sim_backend/worlds
   lira twin --profile rosbot2 --speed 1.5     the ROSbot 2.0's sensors and wheels, 1.5 times real time
+  lira twin --wire /tmp/wire --profile rosbot2  its devices, in the real ones' protocols, for `lira robot` to open
   lira twin --lockstep                        time stands until the driver has answered: fast and repeatable
 """
 
 import argparse
 import threading
 import time
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 from tools.arguments import natural
 
 if TYPE_CHECKING:
     from hal.bus import Bus
+    from hal.profile import RobotProfile
     from sim_backend.twin import Twin
+    from sim_backend.world import World
 
 LOOK_S = 0.2
 STATUS_S = 10.0
@@ -44,6 +48,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     pace = parser.add_mutually_exclusive_group()
     pace.add_argument("--speed", type=float, default=1.0, metavar="X", help="times real time (default: %(default)g)")
     pace.add_argument("--lockstep", action="store_true", help="time passes only when the driver has answered")
+    pace.add_argument(
+        "--wire",
+        type=Path,
+        metavar="DIR",
+        help="be its devices, not a robot on the bus: lidar and base as serial ports in DIR, and a network camera",
+    )
     add(
         "--renderer",
         choices=("auto", "tiny", "egl"),
@@ -59,6 +69,9 @@ def run(args: argparse.Namespace) -> int:
 
     # What is wrong with the words is said at once, before anything heavy is loaded.
     profile, world = load_profile(args.profile), load_world(args.world)
+
+    if args.wire is not None:
+        return run_wire(args, profile, world)
 
     import msgspec
 
@@ -91,6 +104,26 @@ def run(args: argparse.Namespace) -> int:
             ).run(stop)
     finally:
         bus.close()
+    return 0
+
+
+def run_wire(args: argparse.Namespace, profile: "RobotProfile", world: "World") -> int:
+    """Be the robot's devices until told to stop."""
+    from hal.server import stop_on_signal
+    from sim_backend.emulators.bench import WiredTwin
+    from sim_backend.twin import Twin
+
+    twin = Twin(profile, world, layout=args.layout, seed=args.seed, realtime_factor=1.0, renderer=args.renderer)
+    with stop_on_signal() as stop:
+        wired = WiredTwin(twin, args.wire)
+        try:
+            words = (
+                f"--lidar {args.wire}/rplidar --base {args.wire}/core2 --camera {wired.url} --profile {args.profile}"
+            )
+            print(f"world '{world.name}' behind its devices; open them with: lira robot {words}", flush=True)
+            stop.wait()
+        finally:
+            wired.close()
     return 0
 
 

@@ -1,0 +1,80 @@
+import re
+import subprocess
+import sys
+import time
+
+from hal.bus import Bus
+from hal.messages import STOP, Command, Reason, Twist
+from hal.remote import RemoteRobot
+from tools.processes import ChildProcess, free_port, lira_command
+
+
+def lira(*words, block=()):
+    """Run `lira` in a process of its own; importing a package in `block` fails as if it were not installed."""
+    code = f"import sys; sys.modules.update(dict.fromkeys({list(block)!r}))\n"
+    code += f"from tools.cli import main; sys.exit(main({list(words)!r}))"
+    return subprocess.run([sys.executable, "-c", code], check=False, capture_output=True, text=True, timeout=60)
+
+
+NOT_ON_THE_ROBOT = ["torch", "pybullet", "pygame", "safetensors", "matplotlib"]
+
+
+def test_help_needs_nothing_heavy():
+    done = lira("robot", "--help", block=[*NOT_ON_THE_ROBOT, "serial", "openni", "zenoh", "cv2"])
+    assert done.returncode == 0, done.stderr
+    assert "--lidar" in done.stdout
+
+
+def test_it_is_not_driven_blind_unless_told():
+    done = lira("robot", "--base", "nowhere", "--camera", "openni:")
+    assert done.returncode == 2
+    assert done.stderr.splitlines() == [
+        "lira robot: no --lidar",
+        "  Give its URL, or say --without lidar to drive without it.",
+    ]
+    done = lira("robot", "--base", "nowhere", "--camera", "openni:", "--without", "camera", "--without", "lidar")
+    assert "both --camera and --without camera" in done.stderr
+
+
+def test_a_missing_device_is_named_with_its_remedy(tmp_path):
+    words = ["--base", str(tmp_path / "base"), "--without", "lidar", "--without", "camera"]
+    words += ["--listen", f"127.0.0.1:{free_port()}", "--name", f"r{free_port()}"]
+    done = lira("robot", *words, block=NOT_ON_THE_ROBOT)
+    assert done.returncode == 2, done.stderr
+    assert f"there is no {tmp_path / 'base'}" in done.stderr
+    assert "/dev/serial/by-id" in done.stderr
+
+
+def test_without_pyserial_it_says_what_to_install(tmp_path):
+    done = lira("robot", "--base", "x", "--without", "lidar", "--without", "camera", block=["serial"])
+    assert done.returncode == 2
+    assert "lira-rosbot[robot]" in done.stderr
+
+
+def test_the_twin_behind_its_devices_is_driven_over_the_bus(tmp_path):
+    port = free_port()
+    name, endpoint, folder = f"wire_{port}", f"127.0.0.1:{port}", tmp_path / "wire"
+    with ChildProcess("the devices", lira_command("twin", "--wire", str(folder)), tmp_path / "twin.log") as twin:
+        line = twin.wait_ready("open them with: lira robot", 60.0)
+        words = re.search(r"lira robot (.*)", line)[1].split()
+        command = lira_command("robot", *words, "--name", name, "--listen", endpoint)
+        with ChildProcess("the robot", command, tmp_path / "robot.log") as server:
+            server.wait_ready("serves", 60.0)
+            bus = Bus(name, connect=endpoint)
+            robot = RemoteRobot(bus)
+            robot.open()
+            seen, moved = set(), False
+            until_s = time.monotonic() + 15.0
+            while not (moved and seen >= {"scan", "image", "odom", "imu"}) and time.monotonic() < until_s:
+                observation = robot.read()
+                seen |= {part for part in ("scan", "image", "odom", "imu") if getattr(observation, part) is not None}
+                armed = robot.drive(Command(STOP, robot.now(), answers=observation.seq)).reason is Reason.OK
+                twist = Twist(0.3, 0.0) if armed else STOP
+                robot.drive(Command(twist, robot.now(), answers=observation.seq))
+                robot.wait(robot.now() + 0.2)
+                moved |= observation.odom is not None and observation.odom.x_m > 0.05
+            robot.close()
+            assert bus.close()
+            assert (moved, seen) == (True, {"scan", "image", "odom", "imu"})
+            assert server.stop() == 0
+    assert not list(folder.iterdir())
