@@ -4,14 +4,13 @@ import select
 import threading
 import time
 from collections.abc import Callable
+from typing import Protocol
 
 from hal.errors import DeviceError
 from hal.messages import Applied, Reason
 from tools.joystick.freeze import FreezeWatch
 from tools.joystick.hand import Hand, Order, State
 from tools.joystick.mapping import Mapping
-from tools.joystick.nodes import choose, motion_of, read_nodes
-from tools.joystick.pad import Pad
 from tools.joystick.rumble import CALLS, Rumble, pattern_of
 from tools.joystick.stick import PadState
 from tools.joystick.wheel import Wheel
@@ -28,26 +27,52 @@ WORDS = {
 }
 
 
-class Bridge:
-    """Connects one pad with one robot. `device` as in `nodes.choose`; `say` gets a line for a person now and then.
+class OpenPad(Protocol):
+    """A pad that can be read; `tools.joystick.pad.Pad` is the real one."""
 
-    Raises `DeviceError` if the pad that is there cannot be opened; once running it keeps trying instead.
+    name: str
+    state: PadState
+
+    @property
+    def has_motion(self) -> bool:
+        """Whether it has motion sensors, so that it is never silent."""
+
+    def fileno_list(self) -> list[int]:
+        """What to wait for."""
+
+    def read(self) -> tuple[list[PadState], bool]:
+        """States after each report since the last call, and whether anything came; `DeviceError` when it is gone."""
+
+    def rumble(self, strength: float) -> None:
+        """Rumble at a strength in [0, 1] from now on."""
+
+    def close(self) -> None:
+        """Close it; it may be gone."""
+
+
+class Bridge:
+    """Connects one pad with one robot. `find` opens the pad when it is there; `say` gets a line now and then.
+
+    Raises what `find` raises if the pad that is there cannot be opened; once running it keeps trying instead.
     """
 
     def __init__(
-        self, mapping: Mapping, wheel: Wheel, device: str | None = None, say: Callable[[str], None] = print
+        self,
+        mapping: Mapping,
+        wheel: Wheel,
+        find: Callable[[], OpenPad | None],
+        say: Callable[[str], None] = print,
     ) -> None:
         self._mapping = mapping
         self._wheel = wheel
-        self._wanted = device
+        self._open_pad = find
         self._say = say
         self._hand = Hand(mapping)
         self._rumble = Rumble()
         self._watch = FreezeWatch()
         self._awake_s = 0.0  # time without our own stalls: those are no silence of the pad
         self._looked_s = self._due_s = self._search_s = time.monotonic()
-        self._identity: tuple[str, ...] | None = None
-        self._pad: Pad | None = None
+        self._pad: OpenPad | None = None
         self._sent = Order(None)
         self._calls = 0
         self._last_words = ""
@@ -136,18 +161,12 @@ class Bridge:
             self._tell(str(error))
 
     def _find(self) -> None:
-        nodes = read_nodes()
-        if self._identity is not None:
-            nodes = [node for node in nodes if node.is_motion or node.identity == self._identity]
-        node = choose(nodes, self._mapping, self._wanted)
-        if node is None:
+        self._pad = self._open_pad()
+        if self._pad is None:
             return
-        motion = motion_of(node, nodes)
-        self._pad = Pad(node, motion)
-        self._identity = node.identity
         self._watch = FreezeWatch()
-        self._tell(f"pad: {node}" + ("" if motion is None else ", with motion sensors"))
-        if self._mapping.freeze and motion is None:
+        self._tell(f"pad: {self._pad.name}" + (", with motion sensors" if self._pad.has_motion else ""))
+        if self._mapping.freeze and not self._pad.has_motion:
             self._tell("its motion sensors are not there, so nobody will notice if it freezes")
 
     def _lose(self, why: str) -> None:
@@ -166,7 +185,7 @@ class Bridge:
                 self._rumble.play(CALLS[decision.call], now_s)
             self._calls = decision.calls
         if self._pad is not None:
-            self._pad.motor.set(self._rumble.strength(now_s) or 0.0)
+            self._pad.rumble(self._rumble.strength(now_s) or 0.0)
 
     def _explain(self, applied: Applied | None) -> None:
         """Say why the robot stands though a hand drives."""

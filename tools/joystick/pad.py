@@ -8,7 +8,8 @@ from evdev import ecodes, ff
 
 from hal.errors import DeviceError
 from tools.joystick.codes import EV_SYN, SYN_DROPPED, SYN_REPORT
-from tools.joystick.nodes import Node
+from tools.joystick.mapping import Mapping
+from tools.joystick.nodes import Node, choose, motion_of, read_nodes
 from tools.joystick.stick import AxisRange, PadEvent, PadState
 
 LONGEST_RUMBLE_MS = 1000  # the kernel ends an effect by itself if we do not live to do so
@@ -19,6 +20,26 @@ REMEDY = (
 )
 
 
+class Finder:
+    """Opens the pad when it is there, and after that only the same one again. Call it; raises `DeviceError`."""
+
+    def __init__(self, mapping: Mapping, device: str | None = None) -> None:
+        self._mapping = mapping
+        self._device = device
+        self._identity: tuple[str, ...] | None = None
+
+    def __call__(self) -> "Pad | None":
+        """The open pad; None while it is not there."""
+        nodes = read_nodes()
+        known = nodes if self._identity is None else [node for node in nodes if node.identity == self._identity]
+        node = choose(known, self._mapping, self._device)
+        if node is None:
+            return None
+        pad = Pad(node, motion_of(node, nodes))
+        self._identity = node.identity
+        return pad
+
+
 class Pad:
     """An open pad, and its motion sensors if it has any.
 
@@ -26,12 +47,12 @@ class Pad:
     """
 
     def __init__(self, node: Node, motion: Node | None = None) -> None:
-        self.node = node
+        self.name = str(node)
         self._device = _open(node)
         self.state = self._whole_state()
         self._dropped = False
         self._motion = None if motion is None else _open(motion)
-        self.motor = Motor(self._device)
+        self._motor = Motor(self._device)
 
     @property
     def has_motion(self) -> bool:
@@ -54,9 +75,13 @@ class Pad:
             self._take(event, states)
         return states, moved or bool(events)
 
+    def rumble(self, strength: float) -> None:
+        """Rumble at a strength in [0, 1] from now on, for at most a second; 0 stops."""
+        self._motor.set(strength)
+
     def close(self) -> None:
         """Stop the motors and close. May be called on a pad that is gone."""
-        self.motor.set(0.0)
+        self._motor.set(0.0)
         for device in (self._device, self._motion):
             if device is not None:
                 device.close()
@@ -79,7 +104,7 @@ class Pad:
             values = {code: info.value for code, info in axes}
             return PadState(ranges, values, frozenset(self._device.active_keys()))
         except OSError as error:
-            raise _lost(self.node.path, error) from error
+            raise _lost(self.name, error) from error
 
 
 class Motor:

@@ -37,7 +37,7 @@ def run(args: argparse.Namespace) -> int:
     from tools.joystick.mapping import load_mapping
 
     mapping = load_mapping(args.pad)
-    import evdev  # noqa: F401 - missing, it is named before a robot is looked for
+    from tools.joystick.pad import Finder  # without evdev, that is said before a robot is looked for
 
     if args.learn is not None:
         from tools.joystick.ask import learn
@@ -56,7 +56,7 @@ def run(args: argparse.Namespace) -> int:
             bus.ask(INFO, timeout_s=ANSWER_S)
             watch = Bus(args.name, connect=args.connect, watch=True)
             wheel = Wheel(bus, watch, ANSWER_S, say)
-            bridge = Bridge(mapping, wheel, args.device, say)
+            bridge = Bridge(mapping, wheel, Finder(mapping, args.device), say)
             say(f"joystick drives '{args.name}' at {args.connect}; stop with Ctrl-C")
             bridge.run(stop)
     finally:

@@ -1,0 +1,168 @@
+"""From the press of the dead-man to `cmd_vel/applied`, on loopback, while a policy drives.
+
+The robot runs in a process of its own; the pad is a pipe that carries what the kernel would send. A sample ends when
+the robot's word that the hand drives has arrived back here, so it counts the way there and the way back.
+"""
+
+import os
+import random
+import select
+import struct
+import sys
+import threading
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+import numpy as np
+
+from hal.bus import Bus, Reader
+from hal.errors import BusError
+from hal.messages import STOP, Applied, Command, Source, Twist
+from hal.remote import RemoteRobot
+from hal.topics import APPLIED
+from tools.bench import Row, null_robot
+from tools.joystick.bridge import Bridge
+from tools.joystick.codes import AXES, BUTTONS, EV_ABS, EV_KEY, EV_SYN
+from tools.joystick.mapping import Mapping, load_mapping
+from tools.joystick.stick import AxisRange, PadEvent, PadState
+from tools.joystick.wheel import Wheel
+from tools.processes import ChildProcess, free_port
+
+SAMPLES = 150
+WARM_UP = 5
+READY_S = 30.0
+LIMIT_S = 5.0
+POLL_S = 0.0005
+REPORT = struct.Struct("<HHi")
+
+
+class PipePad:
+    """A pad at the end of a pipe."""
+
+    name = "a pipe"
+    has_motion = False
+
+    def __init__(self) -> None:
+        self._read_fd, self._write_fd = os.pipe()
+        self.state = PadState({0: AxisRange(), 1: AxisRange()}, {0: 128, 1: 128})
+
+    def send(self, *events: tuple[int, int, int]) -> None:
+        """One report, as a thumb would cause it."""
+        os.write(self._write_fd, b"".join(REPORT.pack(*event) for event in (*events, (EV_SYN, 0, 0))))
+
+    def fileno_list(self) -> list[int]:
+        """What to wait for."""
+        return [self._read_fd]
+
+    def read(self) -> tuple[list[PadState], bool]:
+        """States after each report. To be called when there is something to read."""
+        states = []
+        if select.select([self._read_fd], [], [], 0.0)[0]:
+            for event in REPORT.iter_unpack(os.read(self._read_fd, REPORT.size * 64)):
+                self.state = self.state.after(PadEvent(*event))
+                if event[0] == EV_SYN:
+                    states.append(self.state)
+        return states, bool(states)
+
+    def rumble(self, strength: float) -> None:
+        """A pipe has no motors."""
+
+    def close(self) -> None:
+        """Close both ends."""
+        os.close(self._read_fd)
+        os.close(self._write_fd)
+
+
+def run() -> list[Row]:
+    """Return one row."""
+    port = free_port()
+    name, endpoint = f"bench_{port}", f"127.0.0.1:{port}"
+    robot = [sys.executable, "-P", "-m", "tools.bench.null_robot", name, endpoint]
+    with TemporaryDirectory() as folder, ChildProcess("the robot", robot, Path(folder) / "robot.log") as server:
+        server.wait_ready(null_robot.READY, READY_S)
+        taken_ms = measure(name, endpoint)
+    p50, p99 = (float(np.percentile(taken_ms, q)) for q in (50, 99))
+    return [{"samples": len(taken_ms), "p50_ms": p50, "p99_ms": p99, "max_ms": max(taken_ms)}]
+
+
+def measure(name: str, endpoint: str) -> list[float]:
+    """Take the wheel from a driving policy and give it back, again and again, at moments without a rhythm."""
+    mapping, pad, rng = load_mapping("ps3"), PipePad(), random.Random(0)
+    taken_ms = []
+    with policy(name, endpoint), bridge(name, endpoint, mapping, pad), bus_of(name, endpoint, watch=True) as bus:
+        applied = bus.reader(APPLIED, depth=64)
+        for _ in range(SAMPLES + WARM_UP):
+            until(applied, lambda result: result.source is Source.POLICY and result.twist != STOP)
+            time.sleep(rng.uniform(0.02, 0.12))
+            applied.poll()
+            pressed_s = time.monotonic()
+            pad.send((EV_ABS, AXES["ABS_Y"], 0), (EV_KEY, BUTTONS[mapping.dead_man], 1))
+            arrived_s = until(applied, lambda result: result.source is Source.TELEOP and result.twist != STOP)
+            taken_ms.append(1e3 * (arrived_s - pressed_s))
+            pad.send((EV_ABS, AXES["ABS_Y"], 128), (EV_KEY, BUTTONS[mapping.dead_man], 0))
+    return taken_ms[WARM_UP:]
+
+
+def until(reader: Reader[Applied], condition: Callable[[Applied], bool]) -> float:
+    """Wait for a result and return when it arrived. Raises `BusError` if it does not come."""
+    deadline_s = time.monotonic() + LIMIT_S
+    while time.monotonic() < deadline_s:
+        for received in reader.poll():
+            if condition(received.message):
+                return received.arrived_s
+        time.sleep(POLL_S)
+    raise BusError("the wheel was not handed over", "Is the machine overloaded?")
+
+
+@contextmanager
+def bus_of(name: str, endpoint: str, *, watch: bool = False) -> Iterator[Bus]:
+    """A bus for a while."""
+    bus = Bus(name, connect=endpoint, watch=watch)
+    try:
+        yield bus
+    finally:
+        bus.close()
+
+
+@contextmanager
+def policy(name: str, endpoint: str) -> Iterator[None]:
+    """Something that drives at the robot's control rate."""
+    with bus_of(name, endpoint) as bus:
+        robot, stop = RemoteRobot(bus), threading.Event()
+        robot.open()
+
+        def drive() -> None:
+            go = STOP
+            while not stop.is_set():
+                robot.drive(Command(go, robot.now(), answers=robot.read().seq))
+                robot.wait(robot.now() + robot.profile.period_s)
+                go = Twist(0.5 * robot.profile.base.max_linear_m_s, 0.0)
+
+        with running(drive, stop):
+            yield
+        robot.close()
+
+
+@contextmanager
+def bridge(name: str, endpoint: str, mapping: Mapping, pad: PipePad) -> Iterator[None]:
+    """The bridge on that pad."""
+    with bus_of(name, endpoint) as bus, bus_of(name, endpoint, watch=True) as watch:
+        stop = threading.Event()
+        loop = Bridge(mapping, Wheel(bus, watch, READY_S, lambda _: None), lambda: pad, lambda _: None)
+        with running(lambda: loop.run(stop), stop):
+            yield
+
+
+@contextmanager
+def running(work: Callable[[], None], stop: threading.Event) -> Iterator[None]:
+    """Work in a thread that ends with the block."""
+    thread = threading.Thread(target=work)
+    thread.start()
+    try:
+        yield
+    finally:
+        stop.set()
+        thread.join()
