@@ -2,7 +2,7 @@
 PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
-BENCHES := twin lockstep latency train preprocess
+BENCHES := twin lockstep latency train preprocess drivers
 
 .PHONY: setup demo test check bench clean
 

@@ -92,14 +92,19 @@ def _node_checks(nodes: Bytes) -> NDArray[np.bool_]:
 def _find_nodes(data: Bytes) -> int:
     """Count the bytes before the first place where nodes look right; too few of them to judge is no reason to go on."""
     room = len(data) - SURE_NODES * NODE_SIZE + 1
-    if room <= 0:
+    if room <= 0 or _sure(data[: SURE_NODES * NODE_SIZE].reshape(-1, NODE_SIZE)):
         return 0
     places = np.lib.stride_tricks.sliding_window_view(data, NODE_SIZE)
     right = _node_checks(places)
     for at in np.flatnonzero(right[:room] & right[NODE_SIZE:][:room] & right[2 * NODE_SIZE :][:room]):
-        if _believable(_read_nodes(places[at::NODE_SIZE][:SURE_NODES])[0]).all():
+        if _sure(places[at::NODE_SIZE][:SURE_NODES]):
             return int(at)
     return room
+
+
+def _sure(nodes: Bytes) -> bool:
+    """Whether a few places [n, 5] in a row look like nodes that follow each other."""
+    return bool(_node_checks(nodes).all() and _believable(_read_nodes(nodes)[0]).all())
 
 
 def _read_nodes(nodes: Bytes) -> tuple[Floats, Floats]:
