@@ -35,6 +35,7 @@ from hal.messages import (
     Source,
     Twist,
 )
+from hal.pictures import is_sound
 
 PACKAGE = "lira_msgs"
 CHANNELS = {"rgb8": 3, "bgr8": 3, "rgba8": 4, "mono8": 1}
@@ -225,7 +226,10 @@ def _compressed_to(m: CompressedImage) -> Any:
 
 
 def _compressed_from(ros: Any) -> CompressedImage:
-    return CompressedImage(_stamp(ros), ros.data.tobytes(), ros.format)
+    data = ros.data.tobytes()
+    if not is_sound(data):
+        raise ValueError("a part of the picture is longer than the picture")
+    return CompressedImage(_stamp(ros), data, ros.format)
 
 
 def _odometry_to(m: Odometry) -> Any:

@@ -31,6 +31,7 @@ from hal.messages import (
     Source,
     Twist,
 )
+from hal.outlet import compress
 from hal.ros import CODECS, TYPES, definition
 
 NAN, INF = math.nan, math.inf
@@ -156,6 +157,15 @@ def test_unknown_words_are_refused():
     data = encode(Applied(Twist(0.0, 0.0), 1.0, reason=Reason.STALE))
     with pytest.raises(CodecError):
         decode(Applied, data.replace(b"stale", b"stole"))
+
+
+def test_a_png_with_a_part_longer_than_itself_is_refused():
+    picture = compress(Image(1.0, np.zeros((8, 8, 3), np.uint8)), "png")
+    assert decode(CompressedImage, encode(picture)) == picture
+    for length in (b"\xff\xff\xff\x7f", b"\x7f\xff\xff\xff", b"\0\0\1\0"):
+        bad = picture.data[:33] + length + picture.data[37:]
+        with pytest.raises(CodecError, match="longer than the picture"):
+            decode(CompressedImage, encode(CompressedImage(1.0, bad, "png")))
 
 
 def test_an_image_that_lies_about_its_size_is_refused():

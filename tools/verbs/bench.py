@@ -4,6 +4,7 @@ examples:
   lira bench twin                       a table to read
   lira bench twin --json -              one JSON object {name, machine, results} and nothing else on standard output
   lira bench latency --json latency.json
+  lira bench soak --minutes 5
 """
 
 import argparse
@@ -14,7 +15,7 @@ import sys
 from pathlib import Path
 from typing import TextIO
 
-from hal.errors import StorageError
+from hal.errors import ConfigError, StorageError
 from tools.bench import BENCHES, Row, cell, columns, describe_machine
 
 
@@ -22,14 +23,17 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
     names = "; ".join(f"{name}: {words}" for name, words in BENCHES.items())
     parser.add_argument("name", choices=BENCHES, metavar="NAME", help=names)
+    parser.add_argument("--minutes", type=float, help="how long the soak goes on (default: 30)")
     parser.add_argument("--json", metavar="FILE", help="write a JSON object to FILE (-: standard output)")
 
 
 def run(args: argparse.Namespace) -> int:
     """Run one benchmark and show its rows."""
+    if args.minutes is not None and args.name != "soak":
+        raise ConfigError(f"'{args.name}' takes no --minutes", "Only the soak does: lira bench soak --minutes 5.")
     output = take_stdout() if args.json == "-" else sys.stdout
     module = importlib.import_module(f"tools.bench.{args.name}")
-    results: list[Row] = module.run()
+    results: list[Row] = module.run(args.minutes) if args.minutes is not None else module.run()
     if args.json is not None:
         text = json.dumps({"name": args.name, "machine": describe_machine(), "results": results}, indent=2)
         if args.json == "-":
