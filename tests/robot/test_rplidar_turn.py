@@ -1,0 +1,106 @@
+import math
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from hal.profile import load_profile
+from robot.rplidar.device import Counts, Stream
+from robot.rplidar.points import parse_dense
+from robot.rplidar.turn import Mounting, Turn, TurnCutter, scan_of
+from sim_backend.emulators.rplidar import encode_dense
+
+LIDAR = load_profile("rosbot2").lidar
+POINTS = 400
+
+
+def spin(turns, start_rad=1.0, points=POINTS, jitter_rad=0.0):
+    """A head that turns at 10 Hz: angles, distances, times."""
+    count = round(turns * points)
+    theta = start_rad + np.arange(count) * math.tau / points
+    theta += np.random.default_rng(0).uniform(-jitter_rad, jitter_rad, count)
+    return theta % math.tau, np.full(count, 2.0), 100.0 + np.arange(count) * 0.1 / points
+
+
+def cut(theta, distance, time, cuts=(), mounting=Mounting()):  # noqa: B008 - frozen
+    cutter = TurnCutter(mounting)
+    edges = [0, *sorted(min(c, len(theta)) for c in cuts), len(theta)]
+    turns = []
+    for a, b in pairwise(edges):
+        turns += cutter.add(theta[a:b], distance[a:b], time[a:b])
+    return turns
+
+
+@settings(max_examples=50, deadline=None)
+@given(
+    cuts=st.lists(st.integers(0, 1800), max_size=20),
+    offset=st.floats(-math.pi, math.pi),
+    mirror=st.booleans(),
+    start=st.floats(0, 6.28),
+)
+def test_turns_are_whole_and_cut_behind_the_robot_however_the_points_come(cuts, offset, mirror, start):
+    turns = cut(*spin(4.5, start, jitter_rad=0.004), cuts, Mounting(offset, mirror))
+    assert len(turns) in (3, 4)
+    for turn in turns:
+        assert abs(len(turn.bearing_rad) - POINTS) <= 2
+        assert np.all(np.diff(turn.time_s) > 0)
+        sweep = -turn.bearing_rad if not mirror else turn.bearing_rad
+        assert np.median(np.diff(sweep)) == pytest.approx(math.tau / POINTS, rel=0.2)
+        assert np.count_nonzero(np.abs(np.diff(turn.bearing_rad)) > 3.0) <= 2  # only jitter at the seam
+
+
+def test_a_gap_of_more_than_half_a_turn_drops_the_turn():
+    theta, distance, time = spin(4.0)
+    time = time.copy()
+    time[600:] += 0.4
+    cutter = TurnCutter(Mounting())
+    turns = cutter.add(theta[:600], distance[:600], time[:600]) + cutter.add(theta[600:], distance[600:], time[600:])
+    assert len(turns) <= 3
+    assert all(turn.time_s[-1] - turn.time_s[0] < 0.11 for turn in turns)
+
+
+def test_each_beam_has_its_time():
+    turn = cut(*spin(3.0))[0]
+    scan = scan_of(turn, LIDAR)
+    assert scan.time_increment == pytest.approx(-0.1 / POINTS, rel=0.02)
+    assert scan.stamp_s == pytest.approx(turn.time_s[-1], abs=0.001)  # of beam 0, which comes last
+    ahead = np.argmin(np.abs(turn.bearing_rad))
+    beam = round(math.pi / scan.angle_increment)
+    assert scan.stamp_s + beam * scan.time_increment == pytest.approx(turn.time_s[ahead], abs=0.001)
+
+
+def test_ranges_are_named_after_rep_117_and_the_nearest_counts():
+    bearing = np.concatenate([np.linspace(math.pi, -math.pi, POINTS, endpoint=False), [0.5, 0.5, -0.5, 1.0, 1.5, 2.0]])
+    distance = np.concatenate([np.full(POINTS, 3.0), [1.0, 2.0, 0.0, 0.05, 0.5, 0.0]])
+    distance[np.abs(bearing + 1.0) < 0.2] = 0.0
+    distance[np.abs(bearing - 2.5) < 0.2] = 14.0
+    turn = Turn(bearing, distance, np.linspace(0.0, 0.1, len(bearing)))
+    scan = scan_of(turn, LIDAR)
+
+    def at(angle):
+        return scan.ranges[round((angle + math.pi) / scan.angle_increment)]
+
+    assert at(0.5) == 1.0
+    assert at(-0.5) == 3.0  # an invalid point does not hide a valid one
+    assert at(1.0) == -math.inf
+    assert math.isnan(at(-1.0))
+    assert at(2.5) == math.inf
+    assert scan.ranges.dtype == np.float32
+
+
+def test_too_little_of_a_turn_is_no_scan():
+    turn = cut(*spin(3.0, points=100))[0]
+    assert scan_of(turn, LIDAR) is None
+
+
+def test_a_burst_of_bytes_keeps_each_points_time():
+    theta, distance, _ = spin(3.0, points=1600)
+    capsules = encode_dense(theta[::40], distance.reshape(-1, 40), first=True)
+    stream = Stream(parse_dense, 62.5e-6, TurnCutter(Mounting()), LIDAR, Counts())
+    scans = stream.feed(capsules[:5000], 100.0) + stream.feed(capsules[5000:], 100.155)
+    assert len(scans) == 2
+    for scan in scans:
+        assert scan.scan_time == pytest.approx(0.1, rel=0.1)
+    assert scans[1].stamp_s <= 100.155
