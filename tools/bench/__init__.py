@@ -17,7 +17,6 @@ BENCHES = {
     "takeover": "from pressing the dead-man to the applied command, while a policy drives",
     "train": "one training step, beside a plain PyTorch loop, and what it does to the control loop",
     "drivers": "what the lidar's and the base's drivers need of a core, and how old a scan is when it is handed on",
-    "drivers": "what the lidar's and the base's drivers need of a core, and how old a scan is when it is handed on",
     "preprocess": "a JPEG of 640x480 to 32x32 gray, beside full decoding and resizing",
     "fuzz": "garbage to every decoder that faces the bus",
     "soak": "twin and driver over the bus for --minutes: memory, threads and files stay flat",
