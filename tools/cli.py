@@ -26,6 +26,7 @@ VERBS = {
     "train-expert": Verb("tools.verbs.train_expert", "train the camera or the lidar expert"),
     "experiment": Verb("tools.verbs.experiment", "repeat an experiment of the thesis, with statistics"),
     "joystick": Verb("tools.verbs.joystick", "drive by hand: a gamepad on this machine, straight to the robot"),
+    "console": Verb("tools.verbs.console", "watch the robot learn on a screen"),
     "report": Verb("tools.verbs.report", "make the HTML page of a recorded run"),
     "keys": Verb("tools.verbs.keys", "make the keys that say who may drive a robot, and encrypt the bus"),
     "stop-test": Verb("tools.verbs.stop_test", "break things while a robot drives, and measure how soon it stands"),

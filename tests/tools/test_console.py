@@ -1,0 +1,206 @@
+import contextlib
+import math
+import os
+import signal
+import sys
+import time
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from hal.bus import Bus
+from hal.messages import (
+    STOP,
+    Applied,
+    BatteryState,
+    CompressedImage,
+    Decision,
+    ExpertView,
+    LabelCounts,
+    LaserScan,
+    Reason,
+    Source,
+    Twist,
+)
+from hal.topics import APPLIED
+from tools.bench import null_robot
+from tools.bench.takeover import policy
+from tools.console import sound
+from tools.console.keyboard import keyboard_mapping, pad_of
+from tools.console.listen import decode_picture
+from tools.console.state import View, battery_share, driver_words
+from tools.joystick.stick import action_of
+from tools.processes import ChildProcess, free_port, lira_command
+
+os.environ["SDL_VIDEODRIVER"] = os.environ["SDL_AUDIODRIVER"] = "dummy"
+
+pygame = pytest.importorskip("pygame", reason="needs pygame: pip install 'lira-rosbot[console]'")
+from tools.console.draw import AMBER, BANNER, RED, SIZE, draw, fan  # noqa: E402
+
+SCAN = LaserScan(1.0, -math.pi / 2, math.pi / 4, 0.1, 4.0, np.array([1.0, math.inf, 2.0, math.nan, 1.0], np.float32))
+EXPERTS = (ExpertView("camera", (0.8, 0.5), 0.16, True), ExpertView("lidar", (0.7, -0.6), 0.01, False))
+DECISION = Decision(
+    1.0, 3, "camera", "attention", (0.8, 0.5), (0.1, 0.0), None, EXPERTS, 0.06, LabelCounts(1, 2, 3, 4, 5), 2, 3, 4
+)
+APPLIED_NOW = Applied(Twist(0.4, 0.2), 1.0, Source.POLICY, Reason.OK)
+VIEW = View(
+    "rosbot", SCAN, 0.1, np.full((32, 32, 3), 200, np.uint8), 0.1, None, APPLIED_NOW, 0.02, DECISION, 0.1,
+    BatteryState(1.0, 11.4),
+)  # fmt: skip
+
+
+def picture(view):
+    pygame.font.init()
+    surface = pygame.Surface(SIZE)
+    draw(surface, view)
+    return pygame.surfarray.array3d(surface)
+
+
+def part(pixels, box):
+    return pixels[box.x : box.right, box.y : box.bottom]
+
+
+def share_of(pixels, colour):
+    return float(np.mean(np.all(pixels == np.array(colour), axis=-1)))
+
+
+def feedback(view):
+    return replace(view, decision=replace(view.decision, call="feedback", driver="novice"))
+
+
+@pytest.mark.parametrize(
+    ("view", "colour", "others"), [(VIEW, AMBER, RED), (feedback(VIEW), RED, AMBER)], ids=["attention", "feedback"]
+)
+def test_a_call_fills_the_banner_with_its_colour(view, colour, others):
+    banner = part(picture(view), BANNER)
+    assert share_of(banner, colour) > 0.6
+    assert share_of(banner, others) == 0.0
+
+
+def test_calls_are_told_apart_without_colour():
+    gray = [part(picture(view), BANNER).mean(axis=-1) for view in (VIEW, feedback(VIEW))]
+    shape = [np.abs(g - np.median(g)) > 60 for g in gray]
+    left = slice(20, 90)
+    assert np.mean(shape[0][left] != shape[1][left]) > 0.05
+    assert abs(np.median(gray[0]) - np.median(gray[1])) > 30
+
+
+def test_a_call_that_is_over_or_old_leaves_no_banner():
+    for view in (replace(VIEW, decision=replace(DECISION, call="none")), replace(VIEW, decision_age_s=2.0)):
+        banner = part(picture(view), BANNER)
+        assert share_of(banner, AMBER) == share_of(banner, RED) == 0.0
+
+
+def test_only_what_changed_changes_on_the_screen():
+    before = picture(VIEW)
+    charged = picture(replace(VIEW, battery=BatteryState(1.0, 12.5)))
+    changed = np.any(before != charged, axis=-1)
+    assert changed[:, 668:].any()
+    assert not changed[:, :660].any()
+    nearer = picture(replace(VIEW, scan=replace(SCAN, ranges=np.full(5, 0.5, np.float32))))
+    changed = np.any(before != nearer, axis=-1)
+    assert changed[16:544, 358:656].any()
+    assert not changed[545:].any()
+
+
+def test_a_stale_picture_is_not_shown():
+    box = pygame.Rect(16, 40, 528, 300)
+    assert share_of(part(picture(VIEW), box), (200, 200, 200)) > 0.3
+    assert share_of(part(picture(replace(VIEW, camera_age_s=2.0)), box), (200, 200, 200)) == 0.0
+
+
+def test_an_empty_view_can_be_drawn():
+    picture(View("rosbot"))
+
+
+def test_the_fan_has_left_on_the_left_and_drops_what_is_invalid():
+    points = fan(SCAN, math.pi, 4.0, (100, 100), 80.0)
+    assert points == [((80, 100), 0.25), ((100, 60), 0.5), ((157, 43), 1.0), ((120, 100), 0.25)]
+    assert [share for _, share in fan(SCAN, 1.0, 4.0, (100, 100), 80.0)] == [0.5]
+
+
+@pytest.mark.parametrize(
+    ("view", "words"),
+    [
+        (VIEW, "EXPERT CAMERA"),
+        (feedback(VIEW), "NOVICE"),
+        (replace(VIEW, estop=True), "EMERGENCY STOP"),
+        (replace(VIEW, link_age_s=3.0), "NO LINK"),
+        (View("rosbot"), "NO LINK"),
+        (replace(VIEW, applied=replace(APPLIED_NOW, source=Source.TELEOP)), "HUMAN"),
+        (replace(VIEW, applied=Applied(STOP, 1.0, Source.NONE, Reason.STALE)), "STANDS"),
+        (replace(VIEW, decision=replace(DECISION, driver="mean")), "EXPERTS' MEAN"),
+        (replace(VIEW, decision=None), "POLICY"),
+    ],
+)
+def test_who_drives_is_said(view, words):
+    assert driver_words(view)[0] == words
+
+
+def test_every_reason_has_words():
+    for reason in Reason:
+        view = replace(VIEW, applied=Applied(STOP, 1.0, Source.NONE, reason))
+        assert " " in driver_words(view)[1]
+
+
+def test_the_battery_is_between_empty_and_full():
+    assert [battery_share(BatteryState(0.0, volts)) for volts in (5.0, 11.4, 13.0)] == pytest.approx([0.0, 0.5, 1.0])
+
+
+def test_the_keyboard_is_a_pad():
+    mapping = keyboard_mapping()
+    assert action_of(pad_of({"up", "left"}), mapping) == pytest.approx((0.5, 0.5))
+    assert action_of(pad_of({"down", "right", "left shift"}), mapping) == pytest.approx((-1.0, -1.0))
+    assert action_of(pad_of({"up", "down", "left", "right"}), mapping) == (0.0, 0.0)
+    assert pad_of({"space"}).holds(mapping.dead_man)
+    assert pad_of({"escape"}).holds(mapping.estop[0])
+    assert pad_of({"f1"}).holds(mapping.release)
+
+
+def test_the_two_calls_sound_different():
+    heard = {call: np.frombuffer(sound.samples(tones), np.int16) for call, tones in sound.CALLS.items()}
+    attention, asked = heard["attention"], heard["feedback"]
+    assert len(asked) > 2 * len(attention)
+    pitches = [np.argmax(np.abs(np.fft.rfft(s[:3000]))) * sound.RATE_HZ / 3000 for s in (attention, asked)]
+    assert pitches == pytest.approx([880, 523], abs=15)
+
+
+def test_a_truncated_picture_is_none():
+    assert decode_picture(CompressedImage(0.0, b"\xff\xd8 no picture")) is None
+
+
+def test_a_console_that_is_stopped_or_killed_changes_nothing_in_control(tmp_path):
+    name, endpoint = f"console{os.getpid()}", f"127.0.0.1:{free_port()}"
+    robot = [sys.executable, "-P", "-m", "tools.bench.null_robot", name, endpoint]
+    words = ["env", "SDL_VIDEODRIVER=dummy", "SDL_AUDIODRIVER=dummy", *lira_command("console", "--name", name)]
+    with contextlib.ExitStack() as stack:
+        server = stack.enter_context(ChildProcess("the robot", robot, tmp_path / "robot.log"))
+        server.wait_ready(null_robot.READY, 30.0)
+        command = [*words, "--connect", endpoint]
+        console = stack.enter_context(ChildProcess("the console", command, tmp_path / "console.log"))
+        console.wait_ready("console shows", 30.0)
+        bus = Bus(name, connect=endpoint)
+        reader = bus.reader(APPLIED, depth=512)
+        with policy(name, endpoint):
+            time.sleep(1.5)
+            assert reader.newest() is not None
+            console.signal(signal.SIGSTOP)
+            time.sleep(2.0)
+            results = reader.poll()
+            console.signal(signal.SIGKILL)
+            time.sleep(1.5)
+            results += reader.poll()
+        bus.close()
+    drives = [r.message for r in results]
+    assert len(drives) > 50
+    assert {d.source for d in drives} == {Source.POLICY}
+    assert {d.reason for d in drives} == {Reason.OK}
+    assert all(d.twist != STOP for d in drives)
+
+
+def test_the_screenshot_is_made_without_a_screen_and_without_a_robot(tmp_path):
+    path = tmp_path / "console.png"
+    with ChildProcess("the console", lira_command("console", "--screenshot", str(path)), tmp_path / "log") as console:
+        assert console.wait(60.0) == 0, console.output()
+    assert pygame.image.load(str(path)).get_size() == SIZE

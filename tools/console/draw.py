@@ -1,0 +1,230 @@
+"""The console's pictures: each function draws one part of a view on a surface. No events, no time, no bus."""
+
+import math
+
+import pygame
+
+from hal.messages import Action, ExpertView, LaserScan
+from tools.console.state import LOW_V, STALE_S, View, battery_share, driver_words
+
+SIZE = (1280, 720)
+# Okabe and Ito's colours, but a red that is darker than the amber: the colour-blind tell them apart by that, by shape
+# and by words.
+BACK, PANEL, EDGE, TEXT, DIM = (18, 20, 24), (32, 36, 43), (70, 76, 86), (236, 238, 240), (150, 156, 166)
+AMBER, RED, BLUE, GREEN, SKY = (230, 159, 0), (192, 40, 40), (0, 114, 178), (0, 158, 115), (86, 180, 233)
+CALL_WORDS = {
+    "attention": ("ATTENTION", "one expert drives: watch it", AMBER, (0, 0, 0)),
+    "feedback": ("YOUR DECISION", "experts disagree: take the wheel", RED, (255, 255, 255)),
+}
+BANNER = pygame.Rect(560, 108, 704, 84)
+
+
+def draw(surface: pygame.Surface, view: View) -> None:
+    """The whole console, for a surface of `SIZE`."""
+    surface.fill(BACK)
+    draw_camera(surface, pygame.Rect(16, 16, 528, 330), view)
+    draw_scan(surface, pygame.Rect(16, 358, 528, 298), view)
+    draw_driver(surface, pygame.Rect(560, 16, 704, 80), view)
+    draw_call(surface, BANNER, view.call)
+    draw_actions(surface, pygame.Rect(560, 204, 704, 330), view)
+    draw_counts(surface, pygame.Rect(560, 546, 704, 110), view)
+    draw_status(surface, pygame.Rect(16, 668, 1248, 40), view)
+
+
+def draw_camera(surface: pygame.Surface, box: pygame.Rect, view: View) -> None:
+    """The camera's picture, as large as fits; hatched out when it is stale."""
+    panel(surface, box, "camera")
+    if view.camera is None or view.camera_age_s > STALE_S:
+        write(surface, "no picture", box.center, 28, DIM, centre=True)
+        return
+    height, width = view.camera.shape[:2]
+    scale = min((box.width - 16) / width, (box.height - 36) / height)
+    size = (max(1, round(width * scale)), max(1, round(height * scale)))
+    picture = pygame.image.frombuffer(view.camera.tobytes(), (width, height), "RGB")
+    picture = pygame.transform.scale(picture, size)
+    surface.blit(picture, picture.get_rect(center=(box.centerx, box.centery + 10)))
+
+
+def draw_scan(surface: pygame.Surface, box: pygame.Rect, view: View) -> None:
+    """What the learner sees of the scan: a fan ahead of the robot, near is bright."""
+    panel(surface, box, f"lidar, {math.degrees(view.fov_rad):.0f} degrees ahead, {view.max_range_m:g} m")
+    if view.scan is None or view.scan_age_s > STALE_S:
+        write(surface, "no scan", box.center, 28, DIM, centre=True)
+        return
+    origin = (box.centerx, box.bottom - 18)
+    reach_px = min(box.height - 50, (box.width / 2 - 12) / max(0.2, math.sin(min(view.fov_rad, math.pi) / 2)))
+    points = fan(view.scan, view.fov_rad, view.max_range_m, origin, reach_px)
+    if len(points) > 1:
+        pygame.draw.polygon(surface, (44, 62, 80), [origin, *(point for point, _ in points)])
+        pygame.draw.lines(surface, EDGE, False, [point for point, _ in points])
+    for point, share in points:
+        if share < 1.0:
+            pygame.draw.circle(surface, AMBER if share < 0.35 else SKY, point, 3)
+    x, y = origin
+    pygame.draw.polygon(surface, TEXT, [(x, y - 12), (x - 8, y + 8), (x + 8, y + 8)])
+
+
+def fan(
+    scan: LaserScan, fov_rad: float, max_range_m: float, origin: tuple[float, float], reach_px: float
+) -> list[tuple[tuple[int, int], float]]:
+    """Points on the screen for the beams ahead, left to right on the screen, each with its share of the range.
+
+    No return is the full range; what is invalid is left out.
+    """
+    points = []
+    for index in range(len(scan.ranges) - 1, -1, -1):
+        angle = scan.angle_min + index * scan.angle_increment
+        angle = math.atan2(math.sin(angle), math.cos(angle))
+        distance_m = float(scan.ranges[index])
+        if abs(angle) > fov_rad / 2 + 1e-6 or math.isnan(distance_m) or distance_m < 0.0:
+            continue
+        share = min(1.0, distance_m / max_range_m)
+        x, y = origin[0] - math.sin(angle) * share * reach_px, origin[1] - math.cos(angle) * share * reach_px
+        points.append((angle, (round(x), round(y)), share))
+    return [(point, share) for _, point, share in sorted(points, reverse=True)]
+
+
+def draw_driver(surface: pygame.Surface, box: pygame.Rect, view: View) -> None:
+    """Who drives, and why."""
+    who, why = driver_words(view)
+    colour = RED if view.estop or who == "NO LINK" else BLUE if who == "HUMAN" else GREEN
+    pygame.draw.rect(surface, PANEL, box, border_radius=6)
+    pygame.draw.rect(surface, colour, (box.x, box.y, 10, box.height), border_radius=4)
+    write(surface, who, (box.x + 26, box.y + 10), 46, TEXT)
+    write(surface, why, (box.x + 26, box.y + 50), 26, DIM)
+
+
+def draw_call(surface: pygame.Surface, box: pygame.Rect, call: str) -> None:
+    """The banner of a call: amber triangle for attention, red octagon for feedback, an empty frame for none."""
+    if call not in CALL_WORDS:
+        pygame.draw.rect(surface, EDGE, box, 1, border_radius=6)
+        write(surface, "no call", box.center, 26, DIM, centre=True)
+        return
+    word, rest, colour, ink = CALL_WORDS[call]
+    pygame.draw.rect(surface, colour, box, border_radius=6)
+    x, y = box.x + 52, box.centery
+    corners, start = (3, -math.pi / 2) if call == "attention" else (8, math.pi / 8)
+    angles = [start + 2 * math.pi * k / corners for k in range(corners)]
+    shape = [(x + 32 * math.cos(a), y + 32 * math.sin(a) + (6 if corners == 3 else 0)) for a in angles]
+    pygame.draw.polygon(surface, ink, shape)
+    write(surface, "!" if call == "attention" else "?", (x, y + 4), 40, colour, centre=True)
+    write(surface, word, (box.x + 104, box.y + 12), 48, ink)
+    write(surface, rest, (box.x + 104, box.y + 52), 26, ink)
+
+
+def draw_actions(surface: pygame.Surface, box: pygame.Rect, view: View) -> None:
+    """Every expert's action and activation beside its threshold, then the novice's, the human's and what drove."""
+    panel(surface, box, "actions: turn and speed, each of the robot's limits; activation beside its threshold")
+    decision = view.decision
+    if decision is None:
+        write(surface, "nobody decides: start lira fusion", box.center, 28, DIM, centre=True)
+        return
+    rows: list[tuple[str, Action, ExpertView | None]] = [(e.name, e.action, e) for e in decision.experts]
+    rows.append(("novice", decision.novice, None))
+    if decision.human is not None:
+        rows.append(("human", decision.human, None))
+    rows.append(("drives", decision.executed, None))
+    step = min(58, (box.height - 40) // len(rows))
+    for index, (name, action, expert) in enumerate(rows):
+        y = box.y + 36 + index * step
+        active = name == decision.driver or (expert is not None and expert.active)
+        write(surface, name, (box.x + 16, y + 6), 30, TEXT if active else DIM)
+        draw_bar(surface, pygame.Rect(box.x + 130, y + 4, 170, 22), -action[1], "turn")
+        draw_bar(surface, pygame.Rect(box.x + 320, y + 4, 170, 22), action[0], "speed")
+        if expert is not None:
+            draw_activation(surface, pygame.Rect(box.x + 510, y + 4, 178, 22), expert, decision.threshold)
+
+
+def draw_bar(surface: pygame.Surface, box: pygame.Rect, value: float, name: str) -> None:
+    """A value in [-1, 1] from the middle."""
+    pygame.draw.rect(surface, EDGE, box, 1)
+    if math.isfinite(value):
+        length = round(min(1.0, max(-1.0, value)) * (box.width / 2 - 2))
+        left = min(box.centerx, box.centerx + length)
+        pygame.draw.rect(surface, SKY, (left, box.y + 3, max(2, abs(length)), box.height - 6))
+    pygame.draw.line(surface, TEXT, (box.centerx, box.y), (box.centerx, box.bottom))
+    write(surface, name, (box.x, box.bottom + 2), 18, DIM)
+
+
+def draw_activation(surface: pygame.Surface, box: pygame.Rect, expert: ExpertView, threshold: float) -> None:
+    """Activation up to three thresholds; the line is the threshold, and a dot says active."""
+    pygame.draw.rect(surface, EDGE, box, 1)
+    full = max(3.0 * threshold, 1e-9)
+    width = round(min(1.0, max(0.0, expert.activation / full)) * (box.width - 4))
+    pygame.draw.rect(surface, AMBER if expert.active else EDGE, (box.x + 2, box.y + 3, width, box.height - 6))
+    x = box.x + 2 + round((box.width - 4) / 3)
+    pygame.draw.line(surface, TEXT, (x, box.y - 3), (x, box.bottom + 3), 2)
+    words = f"{expert.activation:.3f} of {threshold:.2f}" + (", active" if expert.active else "")
+    write(surface, words, (box.x, box.bottom + 2), 18, TEXT if expert.active else DIM)
+
+
+def draw_counts(surface: pygame.Surface, box: pygame.Rect, view: View) -> None:
+    """Labels, interventions, calls and training so far."""
+    panel(surface, box, "so far")
+    if view.decision is None:
+        return
+    d, labels = view.decision, view.decision.labels
+    pairs = (
+        ("human labels", labels.stored_human),
+        ("expert labels", labels.stored_expert),
+        ("demonstration", labels.demonstration),
+        ("interventions", d.interventions),
+        ("calls", d.calls),
+        ("training steps", d.training_steps),
+    )
+    for index, (name, count) in enumerate(pairs):
+        x = box.x + 16 + index * (box.width - 20) // len(pairs)
+        write(surface, str(count), (x, box.y + 36), 42, TEXT)
+        write(surface, name, (x, box.y + 78), 20, DIM)
+
+
+def draw_status(surface: pygame.Surface, box: pygame.Rect, view: View) -> None:
+    """Link, speed, battery, emergency stop, keyboard."""
+    pygame.draw.rect(surface, PANEL, box, border_radius=6)
+    late = view.link_age_s > STALE_S
+    link = "link lost" if late else f"link {1e3 * view.link_age_s:.0f} ms"
+    low = view.battery is not None and view.battery.voltage_v < LOW_V
+    battery = "battery ?" if view.battery is None else f"battery {view.battery.voltage_v:.1f} V"
+    battery += "" if view.battery is None else f" ({100 * battery_share(view.battery):.0f} %)"
+    speed = "" if view.odom is None else f"{view.odom.linear_m_s:+.2f} m/s  {view.odom.angular_rad_s:+.2f} rad/s"
+    stop = "E-STOP PRESSED" if view.estop else "e-stop free"
+    keys = "no keyboard" if view.hand is None else f"keyboard {view.hand}: SPACE + arrows, Esc stops"
+    parts = (
+        (view.robot, TEXT),
+        (link, RED if late else TEXT),
+        (battery + (" LOW" if low else ""), RED if low else TEXT),
+        (speed, TEXT),
+        (stop, RED if view.estop else TEXT),
+        (keys, DIM),
+    )
+    x = box.x + 14
+    for words, colour in parts:
+        x += write(surface, words, (x, box.y + 11), 26, colour) + 30
+
+
+def panel(surface: pygame.Surface, box: pygame.Rect, title: str) -> None:
+    """A titled box."""
+    pygame.draw.rect(surface, PANEL, box, border_radius=6)
+    write(surface, title, (box.x + 10, box.y + 8), 22, DIM)
+
+
+def write(
+    surface: pygame.Surface,
+    words: str,
+    at: tuple[int, int],
+    size: int,
+    colour: tuple[int, int, int],
+    *,
+    centre: bool = False,
+) -> int:
+    """Write a line and return its width in pixels."""
+    if not words:
+        return 0
+    if size not in _FONTS:
+        _FONTS[size] = pygame.font.Font(None, size)
+    image = _FONTS[size].render(words, True, colour)
+    surface.blit(image, image.get_rect(center=at) if centre else image.get_rect(topleft=at))
+    return image.get_width()
+
+
+_FONTS: dict[int, pygame.font.Font] = {}

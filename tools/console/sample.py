@@ -1,0 +1,50 @@
+"""A view to look at without a robot: what the twin sees, with a decision made up. For the picture in the README."""
+
+import math
+
+from hal.messages import Applied, BatteryState, Decision, Episode, ExpertView, Image, LabelCounts, Reason, Source, Twist
+from hal.profile import load_profile
+from tools.console.state import View
+
+START_M = 14.0
+
+
+def sample_view() -> View:
+    """A robot on a line with boxes, at a moment when its experts disagree."""
+    from sim_backend.catalogue import load_world
+    from sim_backend.twin import Twin
+
+    profile = load_profile("thesis-sim")
+    twin = Twin(profile, load_world("line-obstacles"), renderer="tiny")
+    twin.open()
+    try:
+        twin.reset(Episode(start_m=START_M))
+        twin.wait(twin.now() + 0.3)
+        seen = twin.read()
+    finally:
+        twin.close()
+    pixels = seen.image.data if isinstance(seen.image, Image) else None
+    experts = (
+        ExpertView("camera", (0.86, 0.42), 0.161, True),
+        ExpertView("lidar", (0.71, -0.65), 0.118, True),
+    )
+    counts = LabelCounts(stored_human=38, stored_expert=71, demonstration=30)
+    decision = Decision(
+        seen.stamp_s, seen.seq, "novice", "feedback", (0.62, -0.18), (0.62, -0.18), None, experts, 0.06, counts, 4, 5, 9
+    )
+    twist = Twist(0.19, -0.05)
+    return View(
+        robot="rosbot",
+        scan=seen.scan,
+        scan_age_s=0.05,
+        camera=None if pixels is None else (pixels if pixels.ndim == 3 else pixels[..., None].repeat(3, axis=2)),
+        camera_age_s=0.04,
+        odom=seen.odom,
+        applied=Applied(twist, seen.stamp_s, Source.POLICY, Reason.OK),
+        link_age_s=0.012,
+        decision=decision,
+        decision_age_s=0.1,
+        battery=BatteryState(seen.stamp_s, 11.9),
+        fov_rad=min(profile.features.fov_rad, 2 * math.pi),
+        max_range_m=profile.features.max_range_m,
+    )

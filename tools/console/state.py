@@ -1,0 +1,91 @@
+"""Everything the console shows, as one value. Pure: times come in as arguments."""
+
+from dataclasses import dataclass, field
+
+from hal.messages import (
+    Applied,
+    BatteryState,
+    ByteArray,
+    Decision,
+    LaserScan,
+    Odometry,
+)
+from tools.joystick.hand import State
+
+STALE_S = 1.0
+EMPTY_V, LOW_V, FULL_V = 10.2, 10.8, 12.6  # three lithium cells
+
+
+@dataclass(frozen=True, slots=True)
+class View:
+    """What is known now. A part is None until it was heard; ages are in seconds since it was.
+
+    `camera` is RGB, uint8 [height, width, 3]. `hand` is the keyboard's, None without one.
+    """
+
+    robot: str
+    scan: LaserScan | None = None
+    scan_age_s: float = float("inf")
+    camera: ByteArray | None = None
+    camera_age_s: float = float("inf")
+    odom: Odometry | None = None
+    applied: Applied | None = None
+    link_age_s: float = float("inf")
+    decision: Decision | None = None
+    decision_age_s: float = float("inf")
+    battery: BatteryState | None = None
+    estop: bool = False
+    hand: State | None = None
+    fov_rad: float = 2.269
+    max_range_m: float = 4.0
+    limits: tuple[float, float] = field(default=(1.0, 1.0))
+
+    @property
+    def call(self) -> str:
+        """The call that is on now: "none" if nobody decides any more."""
+        fresh = self.decision is not None and self.decision_age_s < STALE_S
+        return self.decision.call if fresh and self.decision is not None else "none"
+
+
+def driver_words(view: View) -> tuple[str, str]:
+    """Who drives, and why, each in a few words."""
+    if view.estop:
+        return "EMERGENCY STOP", "release: START held on the pad, or F1 here"
+    if view.applied is None or view.link_age_s > STALE_S:
+        return "NO LINK", "the robot has not been heard; it stops by itself"
+    if view.applied.source == "teleop":
+        return "HUMAN", "the dead-man is held"
+    if view.applied.source == "none":
+        return "STANDS", REASONS.get(view.applied.reason, view.applied.reason)
+    return policy_words(view.decision)
+
+
+REASONS = {
+    "no_command": "nobody has commanded yet",
+    "stale": "who drove went silent",
+    "neutral_first": "waits for a neutral command",
+    "refused": "refused a command",
+    "estop": "the emergency stop is pressed",
+    "obstacle": "something is in the way",
+    "ok": "told to stand",
+}
+
+
+def policy_words(decision: Decision | None) -> tuple[str, str]:
+    """Which policy drives, and why it is that one."""
+    if decision is None:
+        return "POLICY", "it does not say how it decides"
+    if decision.call == "feedback":
+        return decision.driver.upper(), "experts disagree: it drives slowly and asks you"
+    if decision.driver == "novice":
+        return "NOVICE", "no expert is active"
+    if decision.driver == "mean":
+        return "EXPERTS' MEAN", "active experts agree"
+    if decision.driver == "human":
+        return "WAITS FOR YOU", "demonstrate first: it has learned nothing yet"
+    return f"EXPERT {decision.driver.upper()}", "it alone is active"
+
+
+def battery_share(battery: BatteryState) -> float:
+    """How full, in [0, 1], by voltage."""
+    return min(1.0, max(0.0, (battery.voltage_v - EMPTY_V) / (FULL_V - EMPTY_V)))

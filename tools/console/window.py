@@ -1,0 +1,104 @@
+"""The console's window: look, draw, sound, keyboard, keep time. At most 30 pictures a second; late ones are dropped."""
+
+import os
+import threading
+import time
+from collections.abc import Callable
+from dataclasses import replace
+
+import pygame
+
+from tools.console import sound
+from tools.console.draw import SIZE, draw
+from tools.console.keyboard import keyboard_mapping, pad_of
+from tools.console.state import View
+from tools.joystick.hand import Hand, State
+from tools.joystick.wheel import Wheel
+
+FPS = 30.0
+KEYS = {
+    pygame.K_SPACE: "space",
+    pygame.K_LSHIFT: "left shift",
+    pygame.K_ESCAPE: "escape",
+    pygame.K_F1: "f1",
+    pygame.K_UP: "up",
+    pygame.K_DOWN: "down",
+    pygame.K_LEFT: "left",
+    pygame.K_RIGHT: "right",
+}
+
+
+class Keyboard:
+    """The keyboard's hand on the wheel; a window without the focus is a pad that is lost."""
+
+    def __init__(self, wheel: Wheel) -> None:
+        self._wheel = wheel
+        self._hand = Hand(keyboard_mapping())
+
+    @property
+    def state(self) -> State:
+        """Where the hand is."""
+        return self._hand.state
+
+    def update(self, pressed: frozenset[str] | None) -> None:
+        """Send what the keys order; None without the focus."""
+        self._wheel.listen()
+        now_s = time.monotonic()
+        order = self._hand.update(None if pressed is None else pad_of(pressed), now_s)
+        if order.estop is not None:
+            self._wheel.estop(order.estop)
+        if order.action is not None:
+            self._wheel.drive(order.action, order.released, now_s)
+
+
+def save_picture(view: View, path: str) -> None:
+    """Draw one view without a screen and write it."""
+    os.environ.setdefault("SDL_VIDEODRIVER", "dummy")
+    pygame.font.init()
+    surface = pygame.Surface(SIZE)
+    draw(surface, view)
+    pygame.image.save(surface, path)
+
+
+def show(look: Callable[[], View], keyboard: Keyboard | None, stop: threading.Event) -> None:
+    """Show until the window is closed or `stop` is set."""
+    pygame.display.init()
+    pygame.font.init()
+    sounds = load_sounds()
+    try:
+        screen = pygame.display.set_mode(SIZE, pygame.RESIZABLE | pygame.SCALED)
+        pygame.display.set_caption("lira console")
+        pressed: frozenset[str] = frozenset()
+        call, due_s = "none", time.monotonic()
+        while not stop.is_set():
+            for event in pygame.event.get():
+                if event.type == pygame.QUIT:
+                    return
+                if event.type in (pygame.KEYDOWN, pygame.KEYUP) and event.key in KEYS:
+                    key = frozenset((KEYS[event.key],))
+                    pressed = pressed | key if event.type == pygame.KEYDOWN else pressed - key
+                    if keyboard is not None:  # a press and its end may come within one picture
+                        keyboard.update(pressed)
+            focused = pygame.key.get_focused()
+            pressed = pressed if focused else frozenset()
+            if keyboard is not None:
+                keyboard.update(pressed if focused else None)
+            view = replace(look(), hand=None if keyboard is None else keyboard.state)
+            if view.call != call and view.call in sounds:
+                sounds[view.call].play()
+            call = view.call
+            draw(screen, view)
+            pygame.display.flip()
+            due_s = max(due_s + 1.0 / FPS, time.monotonic())
+            time.sleep(max(0.0, due_s - time.monotonic()))
+    finally:
+        pygame.quit()
+
+
+def load_sounds() -> dict[str, pygame.mixer.Sound]:
+    """The calls' sounds; none on a machine without a loudspeaker."""
+    try:
+        pygame.mixer.init(frequency=sound.RATE_HZ, size=-16, channels=1)
+    except pygame.error:
+        return {}
+    return {call: pygame.mixer.Sound(buffer=sound.samples(tones)) for call, tones in sound.CALLS.items()}

@@ -1,0 +1,60 @@
+"""Watch the robot learn: camera, scan, every expert's action and activation, who drives and why, and its calls.
+
+It only looks, in a process of its own: closing it changes nothing. Without a gamepad the keyboard drives: hold SPACE
+and use the arrows (SHIFT: full speed), Esc is the emergency stop, F1 held for a second releases it.
+
+examples:
+  lira console
+  lira console --connect 192.168.1.20:7447        a robot on another machine
+  lira console --screenshot console.png           write a picture of a sample drive, and end
+"""
+
+import argparse
+import contextlib
+from pathlib import Path
+
+ANSWER_S = 10.0
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the arguments."""
+    add = parser.add_argument
+    add("--name", default="rosbot", help="the robot's name on the bus (default: %(default)s)")
+    add("--connect", default="127.0.0.1:7447", metavar="HOST:PORT", help="where the robot is (default: %(default)s)")
+    add("--no-keyboard", action="store_true", help="do not drive from the keyboard")
+    add("--screenshot", type=Path, metavar="FILE", help="draw a sample without a robot or a screen into a .png")
+
+
+def run(args: argparse.Namespace) -> int:
+    """Show until the window is closed."""
+    import os
+
+    os.environ.setdefault("PYGAME_HIDE_SUPPORT_PROMPT", "1")
+    from tools.console.window import Keyboard, save_picture, show
+
+    if args.screenshot is not None:
+        from tools.console.sample import sample_view
+
+        save_picture(sample_view(), str(args.screenshot))
+        print(f"written: {args.screenshot}")
+        return 0
+
+    from hal.bus import Bus
+    from hal.desk import LOCKSTEP, info_from_json
+    from hal.server import stop_on_signal
+    from hal.topics import INFO
+    from tools.console.listen import Ears
+    from tools.joystick.wheel import Wheel
+
+    with contextlib.ExitStack() as stack:
+        bus = Bus(args.name, connect=args.connect)
+        stack.callback(bus.close)
+        stop = stack.enter_context(stop_on_signal())
+        info = info_from_json(bus.ask(INFO, timeout_s=ANSWER_S))
+        watch = Bus(args.name, connect=args.connect, watch=True)
+        stack.callback(watch.close)
+        by_hand = info.mode != LOCKSTEP and not args.no_keyboard  # no hand follows lockstep
+        keyboard = Keyboard(Wheel(bus, watch, ANSWER_S)) if by_hand else None
+        print(f"console shows '{args.name}' at {args.connect}", flush=True)
+        show(Ears(watch, info.profile).look, keyboard, stop)
+    return 0
