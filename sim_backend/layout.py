@@ -7,7 +7,7 @@ import numpy as np
 
 from hal.errors import ConfigError
 from sim_backend.polyline import Floats, Polyline, resample
-from sim_backend.world import CLOSING_DEG, CLOSING_M, Along, Area, Box, Line, Start, World
+from sim_backend.world import CLOSING_DEG, CLOSING_M, Along, Area, Box, Line, Patch, Start, Tiles, World
 
 DRAWN_STEP_M = 0.02
 # Nothing random stands nearer than this to the start, nothing at all nearer than a robot's size.
@@ -39,13 +39,29 @@ class Block:
 
 
 @dataclass(frozen=True, slots=True)
+class Mark:
+    """A rectangle painted on the floor, in SI units."""
+
+    x_m: float
+    y_m: float
+    yaw_rad: float
+    length_m: float
+    width_m: float
+    gray: int
+
+
+@dataclass(frozen=True, slots=True)
 class Layout:
-    """What the twin is built from. Without a line `curve` is the straight ahead of the start, and is not painted."""
+    """What the twin is built from. Without a line `curve` is the straight ahead of the start, and is not painted.
+
+    Of marks that overlap the later one is seen, and the line over all of them.
+    """
 
     world: World
     seed: int
     curve: Polyline
     blocks: tuple[Block, ...]
+    marks: tuple[Mark, ...] = ()
 
 
 def build(world: World, layout_seed: int = 0) -> Layout:
@@ -57,12 +73,16 @@ def build(world: World, layout_seed: int = 0) -> Layout:
         raise ConfigError(f"layout {layout_seed} is negative", "Layouts are numbered from 0.")
     curve = course_curve(world)
     blocks = [to_block(box) for box in world.box]
+    marks = [joint for tiles in world.tiles for joint in to_joints(tiles)] + [to_mark(patch) for patch in world.patch]
     for number, along in enumerate(world.along):
-        blocks += scatter_along(curve, along, world.limits.finish_m, np.random.default_rng([layout_seed, 1, number]))
+        stream = np.random.default_rng([layout_seed, 1, number])
+        real, fake = scatter_along(curve, along, world.limits.finish_m, stream)
+        blocks += real
+        marks += fake
     start = (world.start.x_m, world.start.y_m)
     for number, area in enumerate(world.area):
         blocks += scatter_area(area, blocks, start, np.random.default_rng([layout_seed, 2, number]))
-    return Layout(world, layout_seed, curve, tuple(blocks))
+    return Layout(world, layout_seed, curve, tuple(blocks), tuple(marks))
 
 
 def check(world: World) -> None:
@@ -121,13 +141,31 @@ def to_block(box: Box) -> Block:
     )
 
 
+def to_mark(patch: Patch) -> Mark:
+    """Leave degrees behind."""
+    yaw_rad = math.radians(patch.yaw_deg)
+    return Mark(patch.x_m, patch.y_m, yaw_rad, patch.length_m, patch.width_m, patch.gray)
+
+
+def to_joints(tiles: Tiles) -> list[Mark]:
+    """Lay the joints: those along y at every multiple of the size from `x_m`, and likewise."""
+    (x0, x1), (y0, y1) = tiles.x_m, tiles.y_m
+    size_m, joint_m, gray = tiles.size_m, tiles.joint_m, tiles.gray
+    return [
+        *(Mark(x, (y0 + y1) / 2, 0.0, joint_m, y1 - y0, gray) for x in np.arange(x0, x1 + joint_m, size_m).tolist()),
+        *(Mark((x0 + x1) / 2, y, 0.0, x1 - x0, joint_m, gray) for y in np.arange(y0, y1 + joint_m, size_m).tolist()),
+    ]
+
+
 def cube(x_m: float, y_m: float, yaw_rad: float, size_m: float, gray: int) -> Block:
     """Make a cube of a scatter."""
     return Block(x_m, y_m, yaw_rad, size_m, size_m, size_m, gray)
 
 
-def scatter_along(curve: Polyline, along: Along, finish_m: float | None, rng: np.random.Generator) -> list[Block]:
-    """One box in each of `count` equal slots of the course, jittered as far as the spacing allows."""
+def scatter_along(
+    curve: Polyline, along: Along, finish_m: float | None, rng: np.random.Generator
+) -> tuple[list[Block], list[Mark]]:
+    """One box, or the fake of one, in each of `count` equal slots of the course, jittered as the spacing allows."""
     end_m = curve.length_m - along.clear_m if finish_m is None else min(finish_m, curve.length_m)
     free_m = end_m - along.clear_m
     slot_m = free_m / along.count
@@ -137,15 +175,20 @@ def scatter_along(curve: Polyline, along: Along, finish_m: float | None, rng: np
             "Lower along.count or along.spacing_m.",
         )
     beside = set(rng.permutation(along.count)[: round(along.count * (1.0 - along.on))].tolist())
-    blocks = []
+    places = []
     for number in range(along.count):
         jitter_m = rng.uniform(-0.5, 0.5) * (slot_m - along.spacing_m)
         at_m = along.clear_m + (number + 0.5) * slot_m + jitter_m
         near_m, far_m = along.beside_m
         off_m = rng.choice([-1.0, 1.0]) * rng.uniform(near_m, far_m)
         on_m = rng.uniform(-1.0, 1.0) * along.on_lateral_m
-        blocks.append(cube(*curve.pose(at_m, float(off_m if number in beside else on_m)), along.size_m, along.gray))
-    return blocks
+        places.append(curve.pose(at_m, float(off_m if number in beside else on_m)))
+    # Drawn last, so that fakes leave the places as they are.
+    fakes = set(rng.permutation(along.count)[: round(along.count * along.fake)].tolist())
+    size_m, height_m = along.size_m, along.height_m or along.size_m
+    real = [Block(*at, size_m, size_m, height_m, along.gray) for k, at in enumerate(places) if k not in fakes]
+    fake = [Mark(*at, *along.fake_m, along.gray) for k, at in enumerate(places) if k in fakes]
+    return real, fake
 
 
 def scatter_area(

@@ -15,6 +15,7 @@ from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from functools import partial
+from itertools import groupby
 from pathlib import Path
 from types import ModuleType
 from typing import TypeVar
@@ -23,13 +24,16 @@ import numpy as np
 
 from hal.errors import MissingExtraError
 from hal.messages import ByteArray, FloatArray
-from sim_backend.layout import Block, Layout
+from sim_backend.layout import Block, Layout, Mark
 from sim_backend.polyline import Floats, Polyline
 from sim_backend.world import Line
 
 T = TypeVar("T")
 
 PAINT_STEP_M = 0.3
+# Paint over paint: each layer lies this far above the one before, the line on top at height 0. The floor itself is not
+# drawn, so nothing hides what is below it.
+LAYER_M = 0.001
 
 # Boxes go into as few bodies as pybullet allows: TinyRenderer's time goes by bodies more than by triangles.
 GROUP = 16
@@ -114,6 +118,10 @@ class Scene:
         bullet.setPhysicsEngineParameter(enableFileCaching=0, physicsClientId=self.client)
         if world.line is not None and world.line.painted:
             self._draw(ribbon_mesh(layout.curve, world.line), world.line.gray)
+        layers = [list(alike) for _, alike in groupby(layout.marks, lambda mark: mark.gray)]
+        for number, layer in enumerate(layers):
+            z_m = (number - len(layers)) * LAYER_M
+            self._draw(join([mark_mesh(mark, z_m) for mark in layer]), layer[0].gray)
         for gray in sorted({block.gray for block in layout.blocks}):
             alike = [block for block in layout.blocks if block.gray == gray]
             for first in range(0, len(alike), GROUP):
@@ -165,10 +173,27 @@ def ribbon_mesh(curve: Polyline, line: Line) -> Mesh:
     edges = []
     for at_m in np.linspace(0.0, curve.length_m, count + 1):
         for side in (-0.5, 0.5):
-            x, y, _ = curve.pose(float(at_m), side * line.width_m)
+            x, y, _ = curve.pose(float(at_m), line.offset_m + side * line.width_m)
             edges.append((x, y, 0.0))
-    indices = [corner for k in range(0, 2 * count, 2) for corner in (k, k + 2, k + 1, k + 1, k + 2, k + 3)]
-    return np.array(edges), indices
+    return np.array(edges), strip(count)
+
+
+def mark_mesh(mark: Mark, z_m: float) -> Mesh:
+    """Two triangles for each stretch of a rectangle along its longer side, facing up."""
+    lengthwise = mark.length_m >= mark.width_m
+    long_m, short_m = (mark.length_m, mark.width_m) if lengthwise else (mark.width_m, mark.length_m)
+    yaw_rad = mark.yaw_rad if lengthwise else mark.yaw_rad + math.pi / 2
+    cos, sin = math.cos(yaw_rad), math.sin(yaw_rad)
+    count = math.ceil(long_m / PAINT_STEP_M)
+    along = np.repeat(np.linspace(-0.5, 0.5, count + 1) * long_m, 2)
+    across = np.tile([-0.5, 0.5], count + 1) * short_m
+    x, y = mark.x_m + cos * along - sin * across, mark.y_m + sin * along + cos * across
+    return np.stack([x, y, np.full_like(x, z_m)], axis=-1), strip(count)
+
+
+def strip(count: int) -> list[int]:
+    """Triangles of `count` stretches between pairs of corners, right and left, one pair after the other."""
+    return [corner for k in range(0, 2 * count, 2) for corner in (k, k + 2, k + 1, k + 1, k + 2, k + 3)]
 
 
 def box_mesh(block: Block) -> Mesh:

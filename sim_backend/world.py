@@ -22,6 +22,14 @@ Share = Annotated[float, Meta(ge=0.0, le=1.0)]
 # A line that is said to close may miss its own beginning by rounding in the file, no more.
 CLOSING_M = 0.05
 CLOSING_DEG = 1.0
+MAX_JOINTS = 500
+
+
+def refuse_empty(**ranges: tuple[float, float]) -> None:
+    """Raise `ValueError` for a range that does not run upwards."""
+    for name, (low, high) in ranges.items():
+        if low >= high:
+            raise ValueError(f"{name} = {[low, high]} must be [from, to] with from < to")
 
 
 class Start(Table, frozen=True):
@@ -59,7 +67,8 @@ class Piece(Table, frozen=True):
 class Line(Table, frozen=True):
     """The line to follow, beginning at `start`. `pieces` are laid end to end, `repeat` times.
 
-    One that is not `painted` cannot be seen: it tells teacher and referee the way where something else shows it.
+    The paint lies `offset_m` to the left of it, for an edge that is followed at a distance. A line that is not
+    `painted` cannot be seen: it tells teacher and referee the way where something else shows it.
     """
 
     pieces: Annotated[tuple[Piece, ...], Meta(min_length=1)]
@@ -67,7 +76,36 @@ class Line(Table, frozen=True):
     closed: bool = False
     width_m: Size = 0.1
     gray: Gray = 0
+    offset_m: Metres = 0.0
     painted: bool = True
+
+
+class Patch(Table, frozen=True):
+    """A rectangle painted on the floor: the camera sees it, nothing else meets it."""
+
+    x_m: Metres
+    y_m: Metres
+    yaw_deg: Degrees = 0.0
+    length_m: Size = 0.45
+    width_m: Size = 0.45
+    gray: Gray = 255
+
+
+class Tiles(Table, frozen=True):
+    """Square tiles over a rectangle: joints of another gray than the ground's. `x_m` and `y_m` are [from, to]."""
+
+    x_m: tuple[Metres, Metres]
+    y_m: tuple[Metres, Metres]
+    size_m: Size = 0.5
+    joint_m: Size = 0.01
+    gray: Gray = 120
+
+    def __post_init__(self) -> None:
+        """Refuse an empty rectangle, and more joints than anybody lays."""
+        refuse_empty(x_m=self.x_m, y_m=self.y_m)
+        joints = sum((high - low) / self.size_m for low, high in (self.x_m, self.y_m))
+        if joints > MAX_JOINTS:
+            raise ValueError(f"tiles of size_m = {self.size_m:g} over this area have {joints:.0f} joints: enlarge them")
 
 
 class Box(Table, frozen=True):
@@ -84,11 +122,12 @@ class Box(Table, frozen=True):
 
 
 class Along(Table, frozen=True):
-    """Cubes scattered along the line, at least `spacing_m` from centre to centre along it.
+    """Boxes scattered along the line, at least `spacing_m` from centre to centre along it.
 
     A share `on` of them stands on the line, up to `on_lateral_m` off its middle; the rest beside it, with the centre
     `beside_m` = [nearest, farthest] to either side. `clear_m` of line stay free at the start (and before a closed
-    line's end, which is the same place).
+    line's end, which is the same place). They are cubes of `size_m` unless `height_m` says otherwise. A share `fake`
+    is only painted on the floor, `fake_m` = [length, width].
     """
 
     count: Few
@@ -98,7 +137,10 @@ class Along(Table, frozen=True):
     on_lateral_m: Gap = 0.0
     beside_m: tuple[Size, Size] = (0.5, 1.0)
     size_m: Size = 0.45
+    height_m: Size | None = None
     gray: Gray = 0
+    fake: Share = 0.0
+    fake_m: tuple[Size, Size] = (0.45, 0.45)
 
     def __post_init__(self) -> None:
         """Refuse an empty lateral range."""
@@ -123,9 +165,7 @@ class Area(Table, frozen=True):
 
     def __post_init__(self) -> None:
         """Refuse an empty rectangle."""
-        for name, (low, high) in (("x_m", self.x_m), ("y_m", self.y_m)):
-            if low >= high:
-                raise ValueError(f"{name} = {[low, high]} must be [from, to] with from < to")
+        refuse_empty(x_m=self.x_m, y_m=self.y_m)
 
 
 class Limits(Table, frozen=True):
@@ -150,6 +190,8 @@ class World(Table, frozen=True):
     sky_gray: Gray = 230
     start: Start = Start()
     line: Line | None = None
+    patch: tuple[Patch, ...] = ()
+    tiles: tuple[Tiles, ...] = ()
     box: tuple[Box, ...] = ()
     along: tuple[Along, ...] = ()
     area: tuple[Area, ...] = ()

@@ -14,7 +14,7 @@ from sim_backend.catalogue import load_world
 from sim_backend.layout import build
 from sim_backend.sensors import Sensors
 from sim_backend.twin import Twin
-from sim_backend.world import Box, Limits, Start, World
+from sim_backend.world import Box, Limits, Line, Patch, Piece, Start, World
 
 SIM = load_profile("thesis-sim")
 ROSBOT = load_profile("rosbot2")
@@ -132,3 +132,168 @@ def test_what_hangs_is_seen_where_it_hangs(look):
         assert changed.min() == math.floor(high)
         # The lower side of a bar above the camera is seen behind its front.
         assert math.floor(low) - 1 <= changed.max() <= math.floor(low)
+
+
+# corridor: the camera is fooled, the lidar is not
+
+CORRIDOR = load_world("corridor")
+NEAR_EDGE_M = 8.0
+
+
+def hallway(*, block=False, spot=False):
+    """The corridor with one foam block, or one spot, that begins at NEAR_EDGE_M in the middle."""
+    (kind,) = CORRIDOR.along
+    size_m, (length_m, width_m) = kind.size_m, kind.fake_m
+    boxes = (
+        Box(
+            x_m=NEAR_EDGE_M + size_m / 2,
+            y_m=0.0,
+            length_m=size_m,
+            width_m=size_m,
+            height_m=kind.height_m,
+            gray=kind.gray,
+        ),
+    )
+    spots = (Patch(x_m=NEAR_EDGE_M + length_m / 2, y_m=0.0, length_m=length_m, width_m=width_m, gray=kind.gray),)
+    return msgspec.structs.replace(
+        CORRIDOR, along=(), box=CORRIDOR.box + (boxes if block else ()), patch=spots if spot else ()
+    )
+
+
+@pytest.mark.parametrize("distance_m", [0.7, 1.0, 1.5, 2.0, 2.5])
+def test_a_foam_block_and_a_white_spot_look_alike(look, distance_m):
+    pose = (NEAR_EDGE_M - distance_m, 0.1, 0.0)
+    empty = look(hallway(), pose)[0]
+    block, spot = (look(hallway(**{kind: True}), pose)[0] - empty for kind in ("block", "spot"))
+    assert min(block.min(), spot.min()) >= 0
+    # They begin in the same row, where the robot would meet them, and share much of what they make white.
+    lowest = [np.flatnonzero((each > 40).any(axis=1)).max() for each in (block, spot)]
+    assert lowest[0] == lowest[1]
+    assert np.minimum(block, spot).sum() >= 0.4 * np.maximum(block, spot).sum()
+
+
+@pytest.mark.parametrize("distance_m", [0.7, 1.0, 1.5])
+def test_foam_and_paint_are_of_one_gray(look, distance_m):
+    pose = (NEAR_EDGE_M - distance_m, 0.1, 0.0)
+    assert [look(hallway(**{kind: True}), pose)[0].max() for kind in ("block", "spot")] == [250, 250]
+
+
+@pytest.mark.parametrize("profile", [SIM, QUIET_ROSBOT], ids=lambda profile: profile.name)
+@pytest.mark.parametrize("distance_m", [0.5, 0.7, 0.9])
+def test_the_lidar_tells_a_foam_block_from_a_white_spot(look, profile, distance_m):
+    pose = (NEAR_EDGE_M - distance_m, 0.0, 0.0)
+    block, spot, empty = (
+        look(world, pose, profile)[1] for world in (hallway(block=True), hallway(spot=True), hallway())
+    )
+    assert (spot == empty).all()
+    ahead_m = block[profile.features.bins // 2] * profile.features.max_range_m
+    assert ahead_m == pytest.approx(distance_m - profile.lidar.x_m, abs=0.01)
+
+
+def test_the_robot_drives_over_a_spot_and_into_a_block():
+    assert not drive_straight(hallway(spot=True), NEAR_EDGE_M - 1.0, 0.0).collided
+    assert drive_straight(hallway(block=True), NEAR_EDGE_M - 1.0, 0.0).collided
+
+
+# garden: the camera is nearly fooled, the lidar is not
+
+GARDEN = load_world("garden")
+EMPTY_GARDEN = load_world("garden-train")
+BOX_X_M, BOX_Y_M = 5.0, 0.15
+
+
+def repainted(gray):
+    """The garden with its box and the box's edge in another gray."""
+    at_box = [box.x_m == BOX_X_M and box.y_m == BOX_Y_M for box in GARDEN.box]
+    assert sum(at_box) == 2
+    boxes = tuple(
+        msgspec.structs.replace(box, gray=gray) if at else box for box, at in zip(GARDEN.box, at_box, strict=True)
+    )
+    return msgspec.structs.replace(GARDEN, box=boxes)
+
+
+def test_the_gardens_differ_in_the_box_alone():
+    less = without(GARDEN, lambda box: (box.x_m, box.y_m) == (BOX_X_M, BOX_Y_M))
+    described = msgspec.structs.replace(EMPTY_GARDEN, name=less.name, description=less.description)
+    assert described == less
+
+
+@pytest.mark.parametrize("distance_m", [0.6, 1.0, 1.5, 2.0, 3.0])
+def test_the_white_box_blends_with_the_tiles(look, distance_m):
+    pose = (BOX_X_M - 0.15 - distance_m, 0.0, 0.0)
+    white, nothing, black = (look(world, pose)[0] for world in (GARDEN, EMPTY_GARDEN, repainted(0)))
+    seen, would_be_seen = np.abs(white - nothing), np.abs(black - nothing)
+    assert would_be_seen.max() >= 150
+    # No pixel changes by more than a joint between two tiles makes, the picture by a fraction of what a black box does.
+    assert seen.max() <= 30
+    assert seen.sum() < 0.1 * would_be_seen.sum()
+
+
+@pytest.mark.parametrize("distance_m", [0.5, 0.7, 1.0])
+def test_the_front_of_the_white_box_is_exactly_as_gray_as_the_tiles(look, distance_m):
+    pose = (BOX_X_M - 0.15 - distance_m, BOX_Y_M, 0.0)
+    white, black = (look(world, pose)[0] for world in (GARDEN, repainted(0)))
+    on_box = black == 0
+    on_box[: np.flatnonzero(on_box.any(axis=1)).min() + 2] = False  # the rows of its purple edge
+    assert on_box.sum() >= 10
+    assert (white[on_box] == GARDEN.ground_gray).all()
+
+
+@pytest.mark.parametrize("profile", [SIM, QUIET_ROSBOT], ids=lambda profile: profile.name)
+def test_the_lidar_sees_the_white_box_and_no_wall(look, profile):
+    pose = (BOX_X_M - 0.15 - 0.9, BOX_Y_M, 0.0)
+    box, nothing = (look(world, pose, profile)[1] for world in (GARDEN, EMPTY_GARDEN))
+    assert (nothing == 1.0).all()
+    ahead_m = box[profile.features.bins // 2] * profile.features.max_range_m
+    assert ahead_m == pytest.approx(0.9 - profile.lidar.x_m, abs=0.01)
+
+
+@pytest.mark.parametrize("progress_m", [0.0, 4.0, 8.0, 9.5, 13.0])
+def test_the_steel_edge_is_seen_to_the_right(look, progress_m):
+    image, _ = look(EMPTY_GARDEN, build(GARDEN).curve.pose(progress_m))
+    lower = image[20:]
+    assert (lower.min(axis=1) < 170).all()  # darker than any joint
+    assert (lower.argmin(axis=1) >= 17).all()
+
+
+# Black on black: the boxes on the lines
+
+
+@pytest.mark.parametrize("name", ["line-obstacles", "eight-obstacles", "race"])
+def test_boxes_on_a_line_have_its_gray(name):
+    world = load_world(name)
+    assert {block.gray for block in build(world).blocks} == {world.line.gray}
+
+
+@pytest.mark.parametrize("name", ["line-obstacles", "eight-obstacles"])
+@pytest.mark.parametrize("distance_m", [0.6, 1.0, 1.5])
+def test_a_box_on_the_line_is_black_where_the_line_is_black(look, name, distance_m):
+    """Nothing of the line turns lighter by the box in front of it."""
+    world = load_world(name)
+    layout = build(world)
+    block = layout.blocks[0]
+    at_m, _, _ = layout.curve.project(np.array([block.x_m, block.y_m]))
+    pose = layout.curve.pose(float(at_m) - block.length_m / 2 - distance_m)
+    boxed, plain = (look(each, pose)[0] for each in (world, msgspec.structs.replace(world, along=())))
+    assert boxed.min() == 0
+    assert (boxed <= plain + 1)[plain < 170].all()
+    assert ((boxed == 0) & (plain < 170)).sum() >= 3
+
+
+# Paint
+
+
+def test_later_paint_covers_earlier_paint_and_the_line_covers_all(look):
+    road = Line(pieces=(Piece(straight_m=20.0),), width_m=0.2, gray=10)
+    wide = Patch(x_m=6.0, y_m=0.0, length_m=10.0, width_m=3.0, gray=250)
+    narrow = Patch(x_m=6.0, y_m=0.0, length_m=10.0, width_m=1.5, gray=90)
+    limits = Limits(lost_m=2.0, finish_m=9.0)
+    image = look(World(description="", limits=limits, line=road, patch=(wide, narrow)), (2.0, 0.0, 0.0))[0]
+    for ahead_m in (0.6, 1.0, 1.5):
+        down = math.floor(row(SIM.camera, ahead_m, 0.0))
+        depth_m = ahead_m / math.cos(SIM.camera.pitch_rad)
+        edge = [column(SIM.camera, math.atan2(y, depth_m)) for y in (0.4, 1.1)]
+        assert [image[down, at] for at in edge] == [90, 250]
+        assert image[down, 15:17].min() < 60
+    reverse = look(World(description="", limits=limits, line=road, patch=(narrow, wide)), (2.0, 0.0, 0.0))[0]
+    assert not (reverse[20:] == 90).any()

@@ -11,7 +11,7 @@ import sim_backend
 from hal.errors import ConfigError
 from sim_backend.catalogue import known_worlds, load_world
 from sim_backend.course import Course
-from sim_backend.layout import build, distance_m
+from sim_backend.layout import Mark, build, distance_m
 
 OVAL = """
 description = "an oval"
@@ -52,7 +52,8 @@ def test_every_world_that_comes_with_the_project_loads_and_builds(name):
 
 
 def test_the_worlds_of_the_thesis_are_there():
-    wanted = {"line", "forest", "line-obstacles", "race", "eight", "eight-obstacles", "passage", "passage-train"}
+    wanted = {"line", "forest", "line-obstacles", "race", "eight", "eight-obstacles"}
+    wanted |= {"passage", "passage-train", "corridor", "corridor-train", "garden", "garden-train"}
     assert wanted <= set(known_worlds())
 
 
@@ -114,6 +115,8 @@ def test_a_mistake_in_a_world_file_is_named(tmp_path, old, new, complaint):
     [
         ("[limits]", "[[along]]\ncount = 2\n[limits]", "has no `line`"),
         ("[limits]", "[[area]]\ncount = 2\nx_m = [5.0, 1.0]\ny_m = [0.0, 1.0]\n[limits]", "from < to"),
+        ("[limits]", "[[tiles]]\nx_m = [5.0, 1.0]\ny_m = [0.0, 1.0]\n[limits]", "from < to"),
+        ("[limits]", "[[tiles]]\nx_m = [0.0, 9.0]\ny_m = [0.0, 1.0]\nsize_m = 0.01\n[limits]", "have 1000 joints"),
         ("[limits]", "[[area]]\ncount = 50\nx_m = [5.0, 6.0]\ny_m = [0.0, 1.0]\n[limits]", "do not fit into the area"),
     ],
 )
@@ -178,10 +181,47 @@ def test_the_eight_with_obstacles_has_the_line_of_the_eight():
 
 
 @pytest.mark.parametrize("seed", range(3))
-@pytest.mark.parametrize("name", ["passage", "passage-train"])
+@pytest.mark.parametrize("name", ["passage", "passage-train", "corridor", "garden"])
 def test_there_is_a_way_through_near_the_line(name, seed):
     layout = build(load_world(name), seed)
     assert reachable_m(Course(layout, 0.154)) >= layout.world.limits.finish_m
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_the_corridor_has_five_blocks_and_four_spots_between_its_walls(seed):
+    layout = build(load_world("corridor"), seed)
+    blocks = [block for block in layout.blocks if block.gray == 250]
+    assert (len(blocks), len(layout.marks)) == (5, 4)
+    places = sorted((each.x_m, each.y_m) for each in (*blocks, *layout.marks))
+    assert np.diff([x for x, _ in places]).min() >= 2.4 - 1e-9
+    assert all(abs(y) <= 0.6 for _, y in places)
+    training = build(load_world("corridor-train"), seed)
+    assert sorted((mark.x_m, mark.y_m) for mark in training.marks) == places
+
+
+def test_which_of_them_are_fake_changes_with_the_layout():
+    real = {tuple(b.x_m > m.x_m for b in layout.blocks for m in layout.marks) for layout in corridors(4)}
+    assert len(real) > 1
+
+
+def corridors(count):
+    return [build(load_world("corridor"), seed) for seed in range(count)]
+
+
+def test_paint_is_where_the_file_says(tmp_path):
+    text = FIELD + "[[patch]]\nx_m = 1.0\ny_m = 2.0\nyaw_deg = 90\nlength_m = 0.5\nwidth_m = 0.2\ngray = 9\n"
+    layout = build(load_world(write(tmp_path, text)))
+    assert layout.marks == (Mark(1.0, 2.0, math.pi / 2, 0.5, 0.2, 9),)
+    assert len(layout.blocks) == 1
+
+
+def test_tiles_have_a_joint_at_each_of_their_edges(tmp_path):
+    text = FIELD + "[[tiles]]\nx_m = [-1.0, 1.0]\ny_m = [0.0, 0.5]\nsize_m = 0.5\njoint_m = 0.02\n"
+    marks = build(load_world(write(tmp_path, text))).marks
+    across = [(mark.x_m, mark.y_m) for mark in marks if mark.length_m == 0.02]
+    along = [(mark.x_m, mark.y_m) for mark in marks if mark.width_m == 0.02]
+    assert across == [(x, 0.25) for x in (-1.0, -0.5, 0.0, 0.5, 1.0)]
+    assert along == [(0.0, 0.0), (0.0, 0.5)]
 
 
 def test_the_passage_is_the_shortest_way_for_the_lidar_alone():
@@ -201,16 +241,17 @@ def test_the_passage_is_the_shortest_way_for_the_lidar_alone():
 def reachable_m(course, lateral_m=1.2):
     """How far along the line the robot can come without touching a box or going farther than this from the line."""
     step_m = 0.05
-    points = course.layout.curve.points
-    axes = [np.arange(low, high, step_m) for low, high in zip(points.min(0) - 2, points.max(0) + 2, strict=True)]
-    xy = np.stack(np.meshgrid(*axes), axis=-1)
-    place = course.place(xy.reshape(-1, 2), np.zeros(xy[..., 0].size))
-    near = np.abs(place.lateral_m.reshape(xy.shape[:2])) < lateral_m
-    free = near & (course.clearance(xy) > step_m)
+    curve = course.layout.curve
+    progress, lateral = np.arange(0.0, curve.length_m, step_m), np.arange(-lateral_m, lateral_m, step_m)
+    knots = np.arange(len(curve.points)) * curve.step_m
+    x, y, heading = (np.interp(progress, knots, values) for values in (*curve.points.T, curve.headings))
+    aside = np.stack([-np.sin(heading), np.cos(heading)], axis=-1)
+    xy = np.stack([x, y], axis=-1)[:, None] + aside[:, None] * lateral[:, None]
+    free = course.clearance(xy) > step_m
     _, parts = cv2.connectedComponents(free.astype(np.uint8), connectivity=4)
-    start = parts[np.abs(xy - points[0]).sum(-1) < 0.1][0]
+    start = parts[0, len(lateral) // 2]
     assert start > 0
-    return place.progress_m.reshape(parts.shape)[parts == start].max()
+    return progress[(parts == start).any(axis=1)].max()
 
 
 def test_the_forest_grows_denser_and_leaves_gaps_and_the_start_free():
