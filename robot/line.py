@@ -67,7 +67,10 @@ class Line:
 
     def close(self) -> None:
         """Let go of it. May be called twice."""
+        left = getattr(self._port, "_socket", None)  # pyserial forgets to close it when the other side has gone
         self._port.close()
+        if left is not None:
+            left.close()
 
     def _lost(self, why: object) -> DeviceError:
         return DeviceError(f"{self.url} was lost: {why}", "Check plug and power; it is opened again when it is back.")
