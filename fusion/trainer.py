@@ -10,6 +10,7 @@ import multiprocessing
 import os
 import pickle
 import signal
+from multiprocessing import resource_tracker
 from multiprocessing.connection import Connection
 from multiprocessing.context import SpawnContext
 
@@ -79,6 +80,7 @@ class ProcessTrainer:
         arguments = (pickle.dumps(learner), theirs, self._shared)
         self._process = context.Process(target=_serve, args=arguments, name="lira-trainer", daemon=True)
         # Ctrl-C reaches every process of the terminal; the trainer's end is its parent's to decide.
+        resource_tracker.ensure_running()  # which the first start does else, and that unblocks the signal
         before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
         try:
             self._process.start()

@@ -112,6 +112,33 @@ def test_the_process_gives_way_and_is_deaf_to_ctrl_c(real_time):
     assert signal.SIGINT not in signal.pthread_sigmask(signal.SIG_BLOCK, ())
 
 
+CTRL_C = """
+import os, signal, threading
+from fusion.learner import Learner
+from fusion.networks import LidarNet
+from fusion.trainer import ProcessTrainer
+
+signal.signal(signal.SIGINT, lambda *_: None)
+ready = threading.Event()
+
+def press():
+    while not ready.wait(0.05):
+        os.killpg(0, signal.SIGINT)
+
+threading.Thread(target=press).start()
+try:
+    ProcessTrainer(Learner(LidarNet(8), seed=0, frozen_trunks=False)).close()
+finally:
+    ready.set()
+"""
+
+
+def test_ctrl_c_while_the_process_starts_does_not_reach_it():
+    words = [sys.executable, "-c", CTRL_C]
+    done = subprocess.run(words, capture_output=True, text=True, timeout=WAIT_S, check=False, start_new_session=True)
+    assert (done.returncode, done.stderr) == (0, "")
+
+
 @pytest.mark.parametrize("adopt_after_s", [None, 0.4])
 def test_a_trainer_that_dies_is_reported_at_the_next_poll(adopt_after_s):
     trainer = process_trainer(adopt_after_s=adopt_after_s)
