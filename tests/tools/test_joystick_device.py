@@ -1,0 +1,165 @@
+import subprocess
+import sys
+
+import pytest
+
+from hal.errors import DeviceError
+from tools.joystick.learn import moved_axis, pressed_button
+from tools.joystick.mapping import load_mapping
+from tools.joystick.nodes import Node, choose, fits, is_any_pad, motion_of, parse_bitmap, read_nodes
+from tools.joystick.stick import AxisRange, PadState
+
+PS3 = load_mapping("ps3")
+KEYS = frozenset(range(304, 319))
+
+
+def node(number, name="pad", *, buttons=KEYS, axes=frozenset(range(6)), uniq="1", motion=False):
+    return Node(f"/dev/input/event{number}", name, "054c", "0268", uniq, buttons, axes, motion)
+
+
+MOTION = node(4, "pad Motion Sensors", buttons=frozenset(), motion=True)
+KEYBOARD = node(2, "keyboard", buttons=frozenset(range(1, 120)), axes=frozenset())
+
+
+def test_bitmaps_are_read_highest_word_first():
+    assert parse_bitmap("7fdb000000000000 0 0 0 0", 64) == {
+        304,
+        305,
+        307,
+        308,
+        310,
+        311,
+        312,
+        313,
+        314,
+        315,
+        316,
+        317,
+        318,
+    }
+    assert parse_bitmap("3f") == {0, 1, 2, 3, 4, 5}
+    assert parse_bitmap("1 0", 32) == {32}
+    assert parse_bitmap("0") == frozenset()
+
+
+def test_a_pad_is_known_by_its_controls_not_by_its_name():
+    nodes = [KEYBOARD, MOTION, node(5, "anything"), node(6, "pad")]
+    assert choose(nodes, PS3).path == "/dev/input/event5"
+    assert not fits(node(7, axes=frozenset([0])), PS3)
+    assert choose([KEYBOARD, MOTION], PS3) is None
+    assert [is_any_pad(n) for n in nodes] == [False, False, True, True]
+
+
+def test_motion_sensors_belong_to_the_pad_with_the_same_address():
+    other = node(3, "pad Motion Sensors", buttons=frozenset(), motion=True, uniq="2")
+    assert motion_of(node(5), [other, MOTION]) is MOTION
+    assert motion_of(node(5), [other]) is None
+
+
+def test_a_given_device_is_taken_through_a_link_and_refused_if_it_is_no_pad(tmp_path):
+    link = tmp_path / "by-id"
+    link.symlink_to("/dev/input/event6")
+    assert choose([node(5), node(6)], PS3, str(link)).path == "/dev/input/event6"
+    assert choose([node(5)], PS3, "/dev/input/event9") is None
+    with pytest.raises(DeviceError, match="does not have the controls"):
+        choose([MOTION], PS3, MOTION.path)
+
+
+def test_a_node_that_goes_away_while_it_is_read_is_left_out(tmp_path):
+    (tmp_path / "event3" / "device").mkdir(parents=True)
+    assert read_nodes(tmp_path) == []
+
+
+def test_learning_takes_the_control_that_moved_and_its_direction():
+    ranges = dict.fromkeys(range(6), AxisRange())
+    rest = PadState(ranges, {0: 128, 1: 130, 2: 0}, frozenset([311]))
+    up = PadState(ranges, {0: 140, 1: 0, 2: 0}, frozenset([311, 310]))
+    axis = moved_axis(rest, up)
+    assert (axis.axis, axis.inverted) == ("ABS_Y", True)
+    assert moved_axis(rest, PadState(ranges, {0: 160, 1: 130, 2: 0})) is None
+    trigger = moved_axis(rest, PadState(ranges, {0: 128, 1: 130, 2: 255}))
+    assert (trigger.axis, trigger.inverted) == ("ABS_Z", False)
+    assert pressed_button(rest, up) == "BTN_TL"
+    assert pressed_button(rest, rest) is None
+
+
+class Motors:
+    """A device that counts effects as the kernel does: stopping or erasing what is not there is an error."""
+
+    def __init__(self, *, gone=False):
+        self.effects, self.running, self.gone, self.levels = set(), set(), gone, []
+
+    def capabilities(self):
+        return {21: [80]}
+
+    def upload_effect(self, effect):
+        if self.gone:
+            raise OSError(19, "No such device")
+        assert 0 < effect.ff_replay.length <= 1000
+        self.levels.append(effect.u.ff_rumble_effect.strong_magnitude)
+        number = len(self.levels)
+        self.effects.add(number)
+        return number
+
+    def write(self, kind, number, value):
+        assert kind == 21
+        assert number in self.effects
+        (self.running.add if value else self.running.discard)(number)
+
+    def erase_effect(self, number):
+        self.effects.remove(number)
+
+
+def test_motors_stop_for_certain_and_leave_no_effect_behind():
+    pad = pytest.importorskip("tools.joystick.pad", reason="needs evdev: pip install 'lira-rosbot[joystick]'")
+    device = Motors()
+    motor = pad.Motor(device)
+    for strength in (1.0, 1.0, 0.5, 0.0, 0.0):
+        motor.set(strength)
+        assert bool(device.running) == (strength > 0.0)
+    assert device.levels == [0xFFFF, 0x8000]
+    assert device.effects == set()
+
+
+def test_a_pad_that_goes_while_it_rumbles_raises_nothing():
+    pad = pytest.importorskip("tools.joystick.pad", reason="needs evdev: pip install 'lira-rosbot[joystick]'")
+    pad.Motor(Motors(gone=True)).set(1.0)
+
+
+@pytest.mark.parametrize("verb", ["joystick", "console"])
+def test_help_needs_neither_pygame_nor_evdev(verb):
+    code = (
+        "import sys; sys.modules.update(dict.fromkeys(['pygame', 'evdev', 'zenoh', 'cv2'])); "
+        f"from tools.cli import main; main([{verb!r}, '--help'])"
+    )
+    done = subprocess.run([sys.executable, "-c", code], check=False, capture_output=True, text=True, timeout=60)
+    assert done.returncode == 0, done.stderr
+    assert "examples:" in done.stdout
+
+
+@pytest.mark.parametrize(
+    ("verb", "package", "extra"), [("joystick", "evdev", "joystick"), ("console", "pygame", "console")]
+)
+def test_a_missing_package_is_named_before_a_robot_is_looked_for(verb, package, extra):
+    code = f"import sys; sys.modules[{package!r}] = None; from tools.cli import main; sys.exit(main([{verb!r}]))"
+    done = subprocess.run([sys.executable, "-c", code], check=False, capture_output=True, text=True, timeout=60)
+    assert done.returncode == 2
+    assert done.stderr.splitlines() == [
+        f"lira {verb}: {package} is not installed",
+        f"  Install it with: pip install 'lira-rosbot[{extra}]'",
+    ]
+
+
+def test_the_bridge_needs_no_pygame():
+    code = (
+        "import sys; sys.modules['pygame'] = None; "
+        "import tools.joystick.bridge, tools.joystick.pad, tools.joystick.wheel, tools.joystick.ask"
+    )
+    assert subprocess.run([sys.executable, "-c", code], check=False, timeout=60).returncode == 0
+
+
+def test_an_unknown_pad_is_refused_before_a_robot_is_looked_for():
+    command = [sys.executable, "-P", "-m", "tools", "joystick", "--pad", "nosuch"]
+    done = subprocess.run(command, check=False, capture_output=True, text=True, timeout=60)
+    assert done.returncode == 2
+    assert "unknown pad 'nosuch'" in done.stderr
