@@ -23,7 +23,7 @@ from hal.messages import (
     Source,
     Twist,
 )
-from hal.topics import APPLIED
+from hal.topics import APPLIED, INFO
 from tools.bench import null_robot
 from tools.bench.takeover import policy
 from tools.console import sound
@@ -31,12 +31,14 @@ from tools.console.keyboard import keyboard_mapping, pad_of
 from tools.console.listen import decode_picture
 from tools.console.state import View, battery_share, driver_words
 from tools.joystick.stick import action_of
+from tools.joystick.wheel import Wheel
 from tools.processes import ChildProcess, free_port, lira_command
 
 os.environ["SDL_VIDEODRIVER"] = os.environ["SDL_AUDIODRIVER"] = "dummy"
 
 pygame = pytest.importorskip("pygame", reason="needs pygame: pip install 'lira-rosbot[console]'")
 from tools.console.draw import AMBER, BANNER, RED, SIZE, draw, fan  # noqa: E402
+from tools.console.window import Keyboard  # noqa: E402
 
 SCAN = LaserScan(1.0, -math.pi / 2, math.pi / 4, 0.1, 4.0, np.array([1.0, math.inf, 2.0, math.nan, 1.0], np.float32))
 EXPERTS = (ExpertView("camera", (0.8, 0.5), 0.16, True), ExpertView("lidar", (0.7, -0.6), 0.01, False))
@@ -198,6 +200,37 @@ def test_a_console_that_is_stopped_or_killed_changes_nothing_in_control(tmp_path
     assert {d.source for d in drives} == {Source.POLICY}
     assert {d.reason for d in drives} == {Reason.OK}
     assert all(d.twist != STOP for d in drives)
+
+
+def test_the_keyboard_drives_locks_without_the_focus_and_comes_back(tmp_path):
+    name, endpoint = f"keys{os.getpid()}", f"127.0.0.1:{free_port()}"
+    robot = [sys.executable, "-P", "-m", "tools.bench.null_robot", name, endpoint]
+    with contextlib.ExitStack() as stack:
+        server = stack.enter_context(ChildProcess("the robot", robot, tmp_path / "robot.log"))
+        server.wait_ready(null_robot.READY, 30.0)
+        bus = Bus(name, connect=endpoint)
+        stack.callback(bus.close)
+        bus.ask(INFO)
+        watch = Bus(name, connect=endpoint, watch=True)
+        stack.callback(watch.close)
+        keyboard, applied = Keyboard(Wheel(bus, watch, 10.0)), watch.reader(APPLIED)
+
+        def press(keys, condition):
+            deadline_s = time.monotonic() + 10.0
+            while (newest := applied.newest()) is None or not condition(newest.message):
+                assert time.monotonic() < deadline_s, (keyboard.state, newest)
+                keyboard.update(keys)
+                time.sleep(1 / 30)
+
+        press(frozenset(), lambda _: keyboard.state == "ready")
+        press(frozenset({"space"}), lambda a: a.source is Source.TELEOP)
+        go = frozenset({"space", "up"})
+        press(go, lambda a: a.twist.linear_m_s == pytest.approx(0.5))
+        press(None, lambda a: a.twist == STOP and keyboard.state == "locked")
+        press(go, lambda a: a.reason is Reason.STALE)
+        assert keyboard.state == "locked"
+        press(frozenset(), lambda _: keyboard.state == "ready")
+        press(frozenset({"space"}), lambda a: a.source is Source.TELEOP)
 
 
 def test_the_screenshot_is_made_without_a_screen_and_without_a_robot(tmp_path):
