@@ -1,0 +1,43 @@
+"""Draw a world: from above, and as the robot's camera sees it at a few places along the way.
+
+examples:
+  lira world passage --picture passage.png             the floor, and what the camera makes of it
+  lira world race --layout 7 --picture race.png        another layout of its boxes
+  lira world my-track.toml --profile rosbot2 --picture my-track.png
+"""
+
+import argparse
+from pathlib import Path
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the arguments."""
+    parser.add_argument("name", help="world by name or .toml file")
+    parser.add_argument("--layout", type=int, default=0, help="which layout of its boxes (default: %(default)s)")
+    parser.add_argument("--profile", default="thesis-sim", help="whose camera looks (default: %(default)s)")
+    parser.add_argument("--picture", required=True, type=Path, metavar="FILE.png", help="where to write the picture")
+
+
+def run(args: argparse.Namespace) -> int:
+    """Draw, and say where the picture is."""
+    from hal.errors import ConfigError
+    from hal.profile import load_profile
+    from sim_backend.catalogue import load_world
+    from sim_backend.layout import build
+
+    picture: Path = args.picture
+    if picture.suffix.lower() != ".png":
+        raise ConfigError(f"{picture} is no .png file", "Name the picture FILE.png.")
+    profile, layout = load_profile(args.profile), build(load_world(args.name), args.layout)
+
+    import cv2
+
+    from tools.world_picture import draw
+
+    _, data = cv2.imencode(".png", draw(layout, profile), [cv2.IMWRITE_PNG_COMPRESSION, 9])
+    try:
+        picture.write_bytes(data.tobytes())
+    except OSError as error:
+        raise ConfigError(f"cannot write {picture}: {error.strerror}", "Choose a folder that is there.") from error
+    print(f"wrote {picture}: world '{layout.world.name}', layout {layout.seed}, seen by {profile.name}")
+    return 0
