@@ -110,6 +110,24 @@ class JoyFeedback:
 
 
 @dataclass(frozen=True, slots=True)
+class DiagnosticStatus:
+    """diagnostic_msgs/DiagnosticStatus. `level`: 0 ok, 1 warning, 2 error, 3 stale; `values` are pairs of text."""
+
+    level: int
+    name: str
+    message: str
+    values: tuple[tuple[str, str], ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class DiagnosticArray:
+    """diagnostic_msgs/DiagnosticArray: what the parts of a process say about themselves."""
+
+    stamp_s: float
+    status: tuple[DiagnosticStatus, ...]
+
+
+@dataclass(frozen=True, slots=True)
 class LaserScan:
     """sensor_msgs/LaserScan. `ranges`: float32 [n], counter-clockwise from `angle_min`, metres, REP-117."""
 

@@ -22,6 +22,8 @@ from hal.messages import (
     CompressedImage,
     CourseState,
     Decision,
+    DiagnosticArray,
+    DiagnosticStatus,
     ExpertView,
     Image,
     Imu,
@@ -145,6 +147,23 @@ def _applied_from(ros: Any) -> Applied:
         ros.command_age_s,
         ros.epoch,
         ros.seq,
+    )
+
+
+def _diagnostics_to(m: DiagnosticArray) -> Any:
+    status, pair = _ros("diagnostic_msgs/msg/DiagnosticStatus"), _ros("diagnostic_msgs/msg/KeyValue")
+    return _ros("diagnostic_msgs/msg/DiagnosticArray")(
+        _header(m.stamp_s, ""),
+        [status(s.level, s.name, s.message, "", [pair(key, value) for key, value in s.values]) for s in m.status],
+    )
+
+
+def _diagnostics_from(ros: Any) -> DiagnosticArray:
+    return DiagnosticArray(
+        _stamp(ros),
+        tuple(
+            DiagnosticStatus(s.level, s.name, s.message, tuple((v.key, v.value) for v in s.values)) for s in ros.status
+        ),
     )
 
 
@@ -380,6 +399,7 @@ class Codec:
 
 CODECS: dict[type, Codec] = {
     Twist: Codec("geometry_msgs/msg/Twist", _twist_to, _twist_from),
+    DiagnosticArray: Codec("diagnostic_msgs/msg/DiagnosticArray", _diagnostics_to, _diagnostics_from),
     Bool: Codec("std_msgs/msg/Bool", _bool_to, _bool_from),
     Clock: Codec("rosgraph_msgs/msg/Clock", _clock_to, _clock_from),
     Applied: Codec("lira_msgs/msg/Applied", _applied_to, _applied_from),

@@ -29,7 +29,7 @@ class CommandLoop:
 
     def __init__(self, robot: GovernedRobot, bus: Bus) -> None:
         self._robot = robot
-        self._inlet = Inlet(bus)
+        self.inlet = Inlet(bus)
         self._applied = bus.publisher(APPLIED)
 
     def run(self, stop: threading.Event) -> None:
@@ -51,10 +51,10 @@ class CommandLoop:
 
     def _obey(self) -> bool:
         """Hand new commands to the governor, the person's first. Returns whether there were any."""
-        if self._inlet.estop():
+        if self.inlet.estop():
             self._robot.press_estop()
         now_s = self._robot.now()
-        commands = self._inlet.teleop(now_s) + self._inlet.policy(now_s)
+        commands = self.inlet.teleop(now_s) + self.inlet.policy(now_s)
         for command in commands:
             self._robot.submit(command)
         return bool(commands)

@@ -10,6 +10,7 @@ import msgspec
 
 from hal.bus import Bus
 from hal.desk import LOCKSTEP, REALTIME, Desk, Info
+from hal.diagnostics import Reporter
 from hal.errors import BusError
 from hal.estop import EstopDesk
 from hal.governed import GovernedRobot
@@ -102,6 +103,8 @@ class HalServer:
         crew.start("images", lambda: images.run(stop))
         estop = EstopDesk(self._robot, self._bus)
         crew.start("estop", lambda: estop.run(stop))
+        reporter = Reporter(self._robot, self._bus, commands.inlet)
+        crew.start("diagnostics", lambda: reporter.run(stop))
         if opened.is_set():
             self._ready()
         # The main thread does nothing, so that it hears signals even while a sensor never answers.

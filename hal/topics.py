@@ -17,6 +17,7 @@ from hal.messages import (
     CompressedImage,
     CourseState,
     Decision,
+    DiagnosticArray,
     Imu,
     Joy,
     JoyFeedback,
@@ -83,6 +84,7 @@ ESTOP = Topic("estop", Bool, 1.0, float("inf"), LATCHED)  # true presses; only a
 JOY = Topic("joy", Joy, 30.0, 0.2, SENSOR)
 JOY_FEEDBACK = Topic("joy/feedback", JoyFeedback, 10.0, 0.2, REPORT)
 DECISION = Topic("lira/decision", Decision, 5.0, 1.0, REPORT)
+DIAGNOSTICS = Topic("diagnostics", DiagnosticArray, 1.0, 3.0, REPORT)
 SIM_STATE = Topic("sim/state", CourseState, 20.0, 0.3, SENSOR)
 CLOCK = Topic("clock", Clock, 20.0, 0.3, URGENT)  # lockstep only: closes an observation
 
@@ -100,6 +102,7 @@ TOPICS: tuple[Topic[Any], ...] = (
     JOY,
     JOY_FEEDBACK,
     DECISION,
+    DIAGNOSTICS,
     SIM_STATE,
     CLOCK,
 )

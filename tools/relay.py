@@ -1,7 +1,8 @@
 """A relay between a robot and its driver, in user space, TCP and UDP on one port: it can fail like a bad link.
 
 Change `faults` at any time, from any thread. While `dark`, datagrams are lost, and streams held and delivered late, as
-TCP does; `delay_s` holds everything back, `copies` sends every datagram more than once, `swap` exchanges neighbours.
+TCP does; `delay_s` holds everything back, `copies` sends every datagram more than once, `swap` exchanges neighbours;
+`no_datagrams` loses all of them and no stream.
 """
 
 import asyncio
@@ -21,6 +22,7 @@ class LinkFaults:
     """What is wrong with the link now."""
 
     dark: bool = False
+    no_datagrams: bool = False
     delay_s: float = 0.0
     copies: int = 1
     swap: bool = False
@@ -168,7 +170,7 @@ class _Sender:
 
     def send(self, data: bytes) -> None:
         faults = self._faults
-        if faults.dark or self._put is None:
+        if faults.dark or faults.no_datagrams or self._put is None:
             return
         if faults.swap and self._held is None:
             self._held = data

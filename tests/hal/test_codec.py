@@ -18,6 +18,8 @@ from hal.messages import (
     CompressedImage,
     CourseState,
     Decision,
+    DiagnosticArray,
+    DiagnosticStatus,
     ExpertView,
     Image,
     Imu,
@@ -62,6 +64,7 @@ MESSAGES = [
     Decision(
         7.25, 12, "human", "none", (0.5, -1.0), (0.25, 0.0), (0.5, -1.0), (), 0.06, LabelCounts(), 0, 0, 0, "x", 3
     ),
+    DiagnosticArray(1.5, (DiagnosticStatus(1, "a", "b", (("c", "d"),)), DiagnosticStatus(0, "e", "f"))),
     Bool(True),
     Joy(1.5, (0.5, -1.0), (1, 0, 1)),
     JoyFeedback(JoyFeedback.TYPE_RUMBLE, 10, 0.5),

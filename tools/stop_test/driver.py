@@ -8,6 +8,7 @@ python -m tools.stop_test.driver NAME HOST:PORT policy|teleop EAR_PORT
 
 import math
 import sys
+from queue import SimpleQueue
 
 from fusion.preprocess import Preprocessor
 from hal.bus import Bus
@@ -19,7 +20,6 @@ from tools.stop_test.control import Ear
 
 READY = "driving by word"
 HAND_HZ = 30.0
-ARM_S = 0.3
 FAREWELLS = 3
 HOUR_S = 3600.0
 STOPPED = {Reason.STALE, Reason.NEUTRAL_FIRST, Reason.REFUSED, Reason.ESTOP}
@@ -38,17 +38,18 @@ class Driver:
         self._preprocess = Preprocessor(robot.profile)
         self._liar = robot.bus.publisher(CMD_VEL)  # the remote robot stamps decisions itself, and truly
         self._applied = Applied(STOP, 0.0)
+        self._words: SimpleQueue[str] = SimpleQueue()
         self._word = "mute"
-        self._since_s = 0.0
 
     def hear(self, word: str) -> None:
-        """Take a word."""
-        self._since_s = self._robot.now()
-        self._word = word
+        """Take a word, from any thread."""
+        self._words.put(word)
 
     def run(self) -> None:
         """Do what the words say, for ever."""
         while True:
+            if not self._words.empty():
+                self._word = self._words.get()
             if self._word == "leave":
                 for _ in range(FAREWELLS):
                     self._drive(STOP, released=True)
@@ -59,7 +60,7 @@ class Driver:
 
     def _wish(self) -> Twist | None:
         """What to command; None to say nothing. Zero would arm a robot that stopped by itself: only `go` does that."""
-        if self._word == "go" and self._robot.now() - self._since_s < ARM_S:
+        if self._word == "go" and self._applied.reason is not Reason.OK:
             return STOP
         if not self._hand and not self._sees():
             return None if self._applied.reason in STOPPED else STOP
@@ -78,7 +79,9 @@ class Driver:
             return
         # A hand answers no observation, so that nobody repeats it.
         answers = -1 if self._hand else self._robot.read().seq
-        self._applied = self._robot.drive(Command(twist, now_s, self._source, answers, released))
+        applied = self._applied = self._robot.drive(Command(twist, now_s, self._source, answers, released))
+        if self._word == "go" and applied.reason is Reason.OK and applied.twist != STOP:
+            self._word = "drive"
 
 
 def main(name: str, endpoint: str, role: str, ear_port: int) -> None:

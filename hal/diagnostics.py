@@ -1,0 +1,69 @@
+"""What a HAL server says about itself once a second, on `diagnostics`: the governor, what was refused, the links."""
+
+import sys
+import threading
+import time
+
+from hal.bus import Bus
+from hal.governed import GovernedRobot
+from hal.governor import State
+from hal.inlet import Inlet
+from hal.messages import DiagnosticArray, DiagnosticStatus
+from hal.topics import DIAGNOSTICS
+
+OK, WARN = 0, 1
+LINKS_PER_PEER = 2
+PATIENCE_S = 3.0  # a peer that has just come has one link for a moment
+NO_DATAGRAMS = "UDP does not get through: over TCP alone commands queue up in a gap of the radio (check the firewall)"
+
+
+class LinkWatch:
+    """Says when peers stay with one link. Pure; the time comes in."""
+
+    def __init__(self) -> None:
+        self._short_since_s: float | None = None
+
+    def look(self, links: int, peers: int, now_s: float) -> str:
+        """Return what is wrong with the links, "" if nothing is or not for long enough."""
+        if links >= LINKS_PER_PEER * peers:
+            self._short_since_s = None
+        elif self._short_since_s is None:
+            self._short_since_s = now_s
+        short = self._short_since_s is not None and now_s - self._short_since_s >= PATIENCE_S
+        return NO_DATAGRAMS if short else ""
+
+
+class Reporter:
+    """Publishes the diagnostics, and prints what is new and wrong to standard error."""
+
+    def __init__(self, robot: GovernedRobot, bus: Bus, inlet: Inlet) -> None:
+        self._robot = robot
+        self._bus = bus
+        self._inlet = inlet
+        self._watch = LinkWatch()
+        self._publisher = bus.publisher(DIAGNOSTICS)
+        self._said = ""
+
+    def run(self, stop: threading.Event) -> None:
+        """Report until `stop` is set."""
+        while not stop.wait(1.0 / DIAGNOSTICS.rate_hz):
+            links, peers = self._bus.links(), self._bus.peers()
+            trouble = self._watch.look(links, peers, time.monotonic())
+            if trouble and trouble != self._said:
+                print(f"{self._bus.robot}: {trouble}", file=sys.stderr, flush=True)
+            self._said = trouble
+            now_s = self._robot.now()
+            self._publisher.put(DiagnosticArray(now_s, (self._governor(), self._link(links, peers, trouble))), now_s)
+
+    def _governor(self) -> DiagnosticStatus:
+        state = self._robot.state
+        counts = self._robot.refused | {"undecodable": self._inlet.dropped}
+        values = tuple((f"refused: {reason}", str(count)) for reason, count in sorted(counts.items()))
+        level = WARN if state in (State.STOPPED, State.EMERGENCY) else OK
+        return DiagnosticStatus(level, f"{self._bus.robot}: governor", state.value, values)
+
+    def _link(self, links: int, peers: int, trouble: str) -> DiagnosticStatus:
+        values = (("links", str(links)), ("peers", str(peers)), ("encrypted", str(self._bus.encrypted).lower()))
+        return DiagnosticStatus(
+            WARN if trouble else OK, f"{self._bus.robot}: link", trouble or "two links each", values
+        )

@@ -1,0 +1,61 @@
+"""What the HAL server says about itself."""
+
+from wiring import joined, new_endpoint, real_time_null, remote, served, wait_for
+
+from hal.bus import Bus
+from hal.diagnostics import NO_DATAGRAMS, PATIENCE_S, WARN, LinkWatch
+from hal.messages import STOP, Command
+from hal.remote import RemoteRobot
+from hal.topics import CMD_VEL, DIAGNOSTICS
+from tools.relay import Relay
+
+
+def test_one_link_is_told_when_it_stays_so():
+    watch = LinkWatch()
+    assert watch.look(0, 0, 0.0) == ""
+    assert watch.look(1, 1, 1.0) == ""
+    assert watch.look(1, 1, 1.0 + PATIENCE_S - 0.1) == ""
+    assert watch.look(1, 1, 1.0 + PATIENCE_S) == NO_DATAGRAMS
+    assert watch.look(2, 1, 9.0) == ""
+    assert watch.look(3, 2, 10.0) == ""
+    assert watch.look(3, 2, 10.0 + PATIENCE_S) == NO_DATAGRAMS
+
+
+def status(reader, part):
+    newest = reader.newest()
+    return None if newest is None else next(s for s in newest.message.status if s.name.endswith(part))
+
+
+def test_what_is_refused_and_the_state_are_published():
+    with served(real_time_null()) as robot, remote(robot) as client, joined(robot) as rival:
+        reader = rival.reader(DIAGNOSTICS)
+        client.drive(Command(STOP, client.now()))
+        for _ in range(3):
+            rival.publisher(CMD_VEL).put(STOP, client.now())
+            rival.put_raw(CMD_VEL, b"nonsense")
+
+        def told():
+            found = status(reader, "governor")
+            return found is not None and {"refused: another commander", "refused: undecodable"} <= {
+                key for key, value in found.values if value != "0"
+            }
+
+        wait_for(told)
+        assert ("links", "4") in status(reader, "link").values
+
+
+def test_it_says_that_datagrams_do_not_get_through_and_still_drives(capfd):
+    with served(real_time_null()) as robot:
+        front = new_endpoint()
+        with Relay(int(front.split(":")[1]), int(robot.endpoint.split(":")[1])) as relay:
+            relay.faults.no_datagrams = True
+            bus = Bus(robot.name, connect=front)
+            client = RemoteRobot(bus)
+            client.open()
+            reader = bus.reader(DIAGNOSTICS)
+            wait_for(lambda: (link := status(reader, "link")) is not None and link.level == WARN, 10.0)
+            assert status(reader, "link").message == NO_DATAGRAMS
+            wait_for(lambda: client.drive(Command(STOP, client.now())).reason == "ok")
+            client.close()
+            assert bus.close()
+    assert capfd.readouterr().err.count("UDP does not get through") == 1
