@@ -27,6 +27,7 @@ M = TypeVar("M")
 
 DEFAULT_ROBOT = "rosbot"
 DEFAULT_ENDPOINT = "127.0.0.1:7447"
+LINKS_PER_PEER = 2
 LEASE_MS = 2000
 OPEN_MS = 2000
 QUERY_PAUSE_S = 0.1
@@ -255,6 +256,11 @@ class Bus:
     def links(self) -> int:
         """How many links are up: two for each peer, or one where UDP is blocked."""
         return len(self._session.info.links())
+
+    def short_peers(self) -> int:
+        """How many peers have less than two links, so that their UDP does not get through. Watchers need but one."""
+        counts = Counter(str(link.zid) for link in self._session.info.links())
+        return sum(counts[str(zid)] < LINKS_PER_PEER for zid in self._session.info.peers_zid())
 
     def close(self, timeout_s: float = 2.0) -> bool:
         """Close the session; False if a dead link kept it from closing in time. May be called twice."""

@@ -12,7 +12,6 @@ from hal.messages import DiagnosticArray, DiagnosticStatus
 from hal.topics import DIAGNOSTICS
 
 OK, WARN = 0, 1
-LINKS_PER_PEER = 2
 PATIENCE_S = 3.0  # a peer that has just come has one link for a moment
 NO_DATAGRAMS = "UDP does not get through: over TCP alone commands queue up in a gap of the radio (check the firewall)"
 
@@ -23,9 +22,9 @@ class LinkWatch:
     def __init__(self) -> None:
         self._short_since_s: float | None = None
 
-    def look(self, links: int, peers: int, now_s: float) -> str:
+    def look(self, short_peers: int, now_s: float) -> str:
         """Return what is wrong with the links, "" if nothing is or not for long enough."""
-        if links >= LINKS_PER_PEER * peers:
+        if short_peers == 0:
             self._short_since_s = None
         elif self._short_since_s is None:
             self._short_since_s = now_s
@@ -47,13 +46,12 @@ class Reporter:
     def run(self, stop: threading.Event) -> None:
         """Report until `stop` is set."""
         while not stop.wait(1.0 / DIAGNOSTICS.rate_hz):
-            links, peers = self._bus.links(), self._bus.peers()
-            trouble = self._watch.look(links, peers, time.monotonic())
+            trouble = self._watch.look(self._bus.short_peers(), time.monotonic())
             if trouble and trouble != self._said:
                 print(f"{self._bus.robot}: {trouble}", file=sys.stderr, flush=True)
             self._said = trouble
             now_s = self._robot.now()
-            self._publisher.put(DiagnosticArray(now_s, (self._governor(), self._link(links, peers, trouble))), now_s)
+            self._publisher.put(DiagnosticArray(now_s, (self._governor(), self._link(trouble))), now_s)
 
     def _governor(self) -> DiagnosticStatus:
         state = self._robot.state
@@ -62,8 +60,12 @@ class Reporter:
         level = WARN if state in (State.STOPPED, State.EMERGENCY) else OK
         return DiagnosticStatus(level, f"{self._bus.robot}: governor", state.value, values)
 
-    def _link(self, links: int, peers: int, trouble: str) -> DiagnosticStatus:
-        values = (("links", str(links)), ("peers", str(peers)), ("encrypted", str(self._bus.encrypted).lower()))
+    def _link(self, trouble: str) -> DiagnosticStatus:
+        values = (
+            ("links", str(self._bus.links())),
+            ("peers", str(self._bus.peers())),
+            ("encrypted", str(self._bus.encrypted).lower()),
+        )
         return DiagnosticStatus(
             WARN if trouble else OK, f"{self._bus.robot}: link", trouble or "two links each", values
         )

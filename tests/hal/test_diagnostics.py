@@ -12,13 +12,23 @@ from tools.relay import Relay
 
 def test_one_link_is_told_when_it_stays_so():
     watch = LinkWatch()
-    assert watch.look(0, 0, 0.0) == ""
-    assert watch.look(1, 1, 1.0) == ""
-    assert watch.look(1, 1, 1.0 + PATIENCE_S - 0.1) == ""
-    assert watch.look(1, 1, 1.0 + PATIENCE_S) == NO_DATAGRAMS
-    assert watch.look(2, 1, 9.0) == ""
-    assert watch.look(3, 2, 10.0) == ""
-    assert watch.look(3, 2, 10.0 + PATIENCE_S) == NO_DATAGRAMS
+    assert watch.look(0, 0.0) == ""
+    assert watch.look(1, 1.0) == ""
+    assert watch.look(1, 1.0 + PATIENCE_S - 0.1) == ""
+    assert watch.look(1, 1.0 + PATIENCE_S) == NO_DATAGRAMS
+    assert watch.look(0, 9.0) == ""
+    assert watch.look(2, 10.0) == ""
+    assert watch.look(2, 10.0 + PATIENCE_S) == NO_DATAGRAMS
+
+
+def test_a_watcher_needs_but_one_link():
+    with served(real_time_null()) as robot, joined(robot) as peer:
+        watcher = Bus(robot.name, connect=robot.endpoint, watch=True)
+        reader = watcher.reader(DIAGNOSTICS)
+        wait_for(lambda: robot._bus.links() == 3)
+        wait_for(lambda: (link := status(reader, "link")) is not None and ("links", "3") in link.values)
+        assert robot._bus.short_peers() == peer.short_peers() == 0
+        assert watcher.close()
 
 
 def status(reader, part):
