@@ -3,7 +3,7 @@
 import threading
 from collections.abc import Callable
 
-from hal.errors import DeviceError
+from hal.errors import DeviceError, LiraError
 
 RETRY_S = 1.0
 JOIN_S = 3.0
@@ -67,11 +67,11 @@ class Keeper:
         while not self._stop.is_set():
             try:
                 self._session(self._stop, self._begin)
-            except DeviceError as error:
+            except LiraError as error:
                 self._failure = error
-            except BaseException as error:
+            except Exception as error:  # noqa: BLE001 - a fault in the driver: told like any other, not tried again
                 self._failure = error
-                raise
+                return
             finally:
                 self._alive.clear()
                 self._failed.set()

@@ -25,6 +25,7 @@ STOP_S = 0.1  # a unit that was told to stop may still send for so long
 SILENCE_S = 0.5  # a scanning unit that sends nothing for so long is lost
 READ_S = 0.1
 CONF_FIRMWARE = (1, 24)
+STANDARD_SAMPLES_S = (500e-6, 250e-6)  # of a standard and an express scan, if the unit does not tell
 POWER = "Check its cable and power, and that the path is the lidar's."
 
 
@@ -72,8 +73,7 @@ class RPLidar:
             line.write(protocol.encode_motor(self._settings.motor_pwm))
             if stop.wait(self._settings.spin_up_s):
                 return
-            self.mode = unit.choose_mode(self.info)
-            rest = unit.start(self.mode)
+            self.mode, rest = unit.start(self.info)
             self._read(line, self.mode, rest, stop, begin)
         finally:
             halt(line)
@@ -172,30 +172,28 @@ class Unit:
             "Does its head turn freely? Unplug it and plug it in again; if the error stays, the unit is broken.",
         )
 
-    def choose_mode(self, info: Info) -> Mode:
-        """Take the best mode that the unit offers and we understand."""
-        if info.firmware >= CONF_FIRMWARE:
-            modes = self._offered()
-            for answer in PARSERS:
-                for mode in modes:
-                    if mode.answer is answer:
-                        return mode
-        rates = self._ask(protocol.encode_request(Request.SAMPLE_RATE), Answer.SAMPLE_RATE, 4)
-        standard_s, express_s = (500e-6, 250e-6) if rates is None else protocol.parse_sample_rate(rates)
-        if rates is None or express_s <= 0.0:
-            return Mode(protocol.encode_request(Request.SCAN), Answer.STANDARD, standard_s)
-        return Mode(protocol.encode_express(0), Answer.EXPRESS, express_s)
+    def start(self, info: Info) -> tuple[Mode, bytes]:
+        """Begin to scan in the best mode that it offers and we understand; returns it, and what came of the stream.
 
-    def start(self, mode: Mode) -> bytes:
-        """Begin to scan; returns what has come of the stream. Raises `DeviceError` if it does not begin."""
-        self._line.write(mode.request)
-        heard, until_s = b"", time.monotonic() + ANSWER_S
-        while time.monotonic() < until_s:
-            heard += self._line.read(READ_S)
-            rest = protocol.find_stream(heard, mode.answer)
+        Raises `DeviceError` if no mode begins.
+        """
+        for mode in self._modes(info):
+            self._line.write(mode.request)
+            rest = self._hear(lambda data, mode=mode: protocol.find_stream(data, mode.answer))  # type: ignore[misc]
             if rest is not None:
-                return rest
+                return mode, rest
+            self._silence()
         raise DeviceError(f"the lidar at {self._line.url} does not scan", "Does its motor turn? " + POWER)
+
+    def _modes(self, info: Info) -> list[Mode]:
+        """Modes to try, best first. Old firmware does not tell; the oldest knows nothing but the standard scan."""
+        rates = self._ask(protocol.encode_request(Request.SAMPLE_RATE), Answer.SAMPLE_RATE, 4)
+        standard_s, express_s = STANDARD_SAMPLES_S if rates is None else protocol.parse_sample_rate(rates)
+        offered = self._offered() if info.firmware >= CONF_FIRMWARE else []
+        modes = [mode for answer in PARSERS for mode in offered if mode.answer is answer]
+        if not modes and express_s > 0.0:
+            modes.append(Mode(protocol.encode_express(0), Answer.EXPRESS, express_s))
+        return [*modes, Mode(protocol.encode_request(Request.SCAN), Answer.STANDARD, standard_s)]
 
     def _offered(self) -> list[Mode]:
         """Every mode in the unit's table that we understand."""
@@ -221,6 +219,10 @@ class Unit:
     def _exchange(self, request: bytes, find: Callable[[bytes], bytes | None]) -> bytes | None:
         """Send a request and wait for what `find` finds; None if it does not come in time."""
         self._line.write(request)
+        return self._hear(find)
+
+    def _hear(self, find: Callable[[bytes], bytes | None]) -> bytes | None:
+        """Wait for what `find` finds in all that comes; None if it does not come in time."""
         heard, until_s = b"", time.monotonic() + ANSWER_S
         while (left_s := until_s - time.monotonic()) > 0.0:
             heard += self._line.read(left_s)

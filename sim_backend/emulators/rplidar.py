@@ -110,7 +110,7 @@ class RplidarUnit:
 
     def _express(self, number: int) -> ScanMode | None:
         if number == 0:
-            return EXPRESS_MODE
+            return EXPRESS_MODE if EXPRESS_MODE in self.model.modes else None
         return self.model.modes[number] if number < len(self.model.modes) else None
 
     def _begin(self, mode: ScanMode | None, now_s: float) -> None:

@@ -93,6 +93,7 @@ def test_unplugged_mid_drive_it_stands_and_resumes_after_return_and_a_neutral_co
         wire.plug()
         applied = keep(robot, GO, 8.0, lambda applied: applied.clamps == ("neutral_first",))
         assert (applied.reason, applied.twist) == (Reason.NEUTRAL_FIRST, STOP)
+        keep(robot, GO, 0.2)
         assert bench.twin.state().linear_m_s == 0.0
         keep(robot, STOP, 0.1)
         assert keep(robot, GO, 1.0, drives).twist == GO
@@ -107,6 +108,7 @@ def test_a_reset_of_the_board_stops_it_until_the_board_is_back(tmp_path):
         bench.base.reset()
         assert keep(robot, GO, 2.0, lambda applied: bool(applied.clamps)).clamps == ("no_base",)
         assert keep(robot, GO, 5.0, lambda applied: applied.clamps == ("neutral_first",)).twist == STOP
+        keep(robot, GO, 0.2)
         assert bench.twin.state().linear_m_s == 0.0
         assert not bench.base.crashed
 

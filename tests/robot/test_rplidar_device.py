@@ -66,7 +66,8 @@ def around(scan, degrees, within=3):
 
 
 MODELS = {
-    "standard, old firmware": (Model(firmware=(1, 20), modes=(STANDARD_MODE,)), "EXPRESS"),
+    "express, old firmware": (Model(firmware=(1, 20)), "EXPRESS"),
+    "standard, oldest firmware": (Model(firmware=(1, 10), modes=(STANDARD_MODE,)), "STANDARD"),
     "express by table": (Model(), "EXPRESS"),
     "dense": (Model(modes=(STANDARD_MODE, EXPRESS_MODE, DENSE_MODE)), "DENSE"),
     "standard only": (Model(modes=(STANDARD_MODE,)), "STANDARD"),
