@@ -41,8 +41,9 @@ class Obstacles:
         return Obstacles(*np.array(rows, dtype=np.float64).reshape(-1, 6).T)
 
     def near(self, x_m: float, y_m: float, reach_m: float) -> "Obstacles":
-        """Only the boxes with their centre within `reach_m` of a point."""
-        kept = np.hypot(self.x_m - x_m, self.y_m - y_m) <= reach_m
+        """Only the boxes that may have a part within `reach_m` of a point, however long they are."""
+        size_m = np.hypot(self.half_length_m, self.half_width_m)
+        kept = np.hypot(self.x_m - x_m, self.y_m - y_m) <= reach_m + size_m
         return Obstacles(
             *(self.x_m[kept], self.y_m[kept], self.half_length_m[kept], self.half_width_m[kept]),
             *(self.cos[kept], self.sin[kept]),

@@ -238,6 +238,13 @@ def test_the_passage_is_the_shortest_way_for_the_lidar_alone():
     assert abs(lintel.y_m) < abs(right)
 
 
+def test_a_long_wall_is_met_however_far_away_its_middle_is():
+    obstacles = Course(build(load_world("corridor")), 0.154).obstacles
+    beside_the_wall = np.array([0.0, 1.0])
+    assert obstacles.near(0.0, 0.0, 4.0).distance(beside_the_wall) == pytest.approx(0.2)
+    assert len(obstacles.near(0.0, 0.0, 4.0).x_m) < len(obstacles.x_m)
+
+
 def reachable_m(course, lateral_m=1.2):
     """How far along the line the robot can come without touching a box or going farther than this from the line."""
     step_m = 0.05
