@@ -37,7 +37,7 @@ from tools.processes import ChildProcess, free_port, lira_command
 os.environ["SDL_VIDEODRIVER"] = os.environ["SDL_AUDIODRIVER"] = "dummy"
 
 pygame = pytest.importorskip("pygame", reason="needs pygame: pip install 'lira-rosbot[console]'")
-from tools.console.draw import AMBER, BANNER, RED, SIZE, draw, fan  # noqa: E402
+from tools.console.draw import AMBER, BANNER, RED, SIZE, SKY, draw, fan  # noqa: E402
 from tools.console.window import Keyboard  # noqa: E402
 
 SCAN = LaserScan(1.0, -math.pi / 2, math.pi / 4, 0.1, 4.0, np.array([1.0, math.inf, 2.0, math.nan, 1.0], np.float32))
@@ -112,6 +112,14 @@ def test_a_stale_picture_is_not_shown():
     assert share_of(part(picture(replace(VIEW, camera_age_s=2.0)), box), (200, 200, 200)) == 0.0
 
 
+def test_actions_of_an_old_decision_are_not_shown_and_its_counts_are():
+    bars, counts = pygame.Rect(690, 240, 560, 200), pygame.Rect(576, 580, 60, 40)
+    fresh, old = picture(VIEW), picture(replace(VIEW, decision_age_s=2.0))
+    assert share_of(part(fresh, bars), SKY) > 0.02
+    assert share_of(part(old, bars), SKY) == 0.0
+    assert np.array_equal(part(fresh, counts), part(old, counts))
+
+
 def test_an_empty_view_can_be_drawn():
     picture(View("rosbot"))
 
@@ -134,6 +142,7 @@ def test_the_fan_has_left_on_the_left_and_drops_what_is_invalid():
         (replace(VIEW, applied=Applied(STOP, 1.0, Source.NONE, Reason.STALE)), "STANDS"),
         (replace(VIEW, decision=replace(DECISION, driver="mean")), "EXPERTS' MEAN"),
         (replace(VIEW, decision=None), "POLICY"),
+        (replace(VIEW, decision_age_s=2.0), "POLICY"),
     ],
 )
 def test_who_drives_is_said(view, words):

@@ -115,7 +115,7 @@ def draw_call(surface: pygame.Surface, box: pygame.Rect, call: str) -> None:
 def draw_actions(surface: pygame.Surface, box: pygame.Rect, view: View) -> None:
     """Every expert's action and activation beside its threshold, then the novice's, the human's and what drove."""
     panel(surface, box, "actions: turn and speed, each of the robot's limits; activation beside its threshold")
-    decision = view.decision
+    decision = view.deciding
     if decision is None:
         write(surface, "nobody decides: start lira fusion", box.center, 28, DIM, centre=True)
         return

@@ -36,11 +36,11 @@ class Ears:
 
     def look(self) -> View:
         """The view now."""
-        now_s = time.monotonic()
         scan, odom, applied = self._scan.newest(), self._odom.newest(), self._applied.newest()
         decision, battery = self._decision.newest(), self._battery.newest()
         for received in self._camera.poll()[-1:]:
             self._picture, self._picture_s = decode_picture(received.message), received.arrived_s
+        now_s = time.monotonic()
         return replace(
             self._view,
             scan=_message(scan),

@@ -41,10 +41,14 @@ class View:
     limits: tuple[float, float] = field(default=(1.0, 1.0))
 
     @property
+    def deciding(self) -> Decision | None:
+        """The decision that holds now: None if nobody decides any more. Its counts outlive it."""
+        return self.decision if self.decision_age_s < STALE_S else None
+
+    @property
     def call(self) -> str:
-        """The call that is on now: "none" if nobody decides any more."""
-        fresh = self.decision is not None and self.decision_age_s < STALE_S
-        return self.decision.call if fresh and self.decision is not None else "none"
+        """The call that is on now, or "none"."""
+        return "none" if self.deciding is None else self.deciding.call
 
 
 def driver_words(view: View) -> tuple[str, str]:
@@ -57,7 +61,7 @@ def driver_words(view: View) -> tuple[str, str]:
         return "HUMAN", "the dead-man is held"
     if view.applied.source == "none":
         return "STANDS", REASONS.get(view.applied.reason, view.applied.reason)
-    return policy_words(view.decision)
+    return policy_words(view.deciding)
 
 
 REASONS = {
