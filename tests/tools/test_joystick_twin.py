@@ -88,8 +88,8 @@ def test_a_press_takes_the_wheel_from_the_learner_which_labels_it(bed, hand, wat
         bed.key(PAD, "BTN_TL", 1)
         hand.wait_ready("you drive", 10.0)
         bed.axis(PAD, "ABS_Y", 0)
-        # Before the first training step the human demonstrates, and stands while the hand is off.
-        decision = newest(decisions, lambda d: d.labels.demonstration >= 1)
+        # Before the first training step the human demonstrates, from the press on: at first with the stick centred.
+        decision = newest(decisions, lambda d: d.labels.demonstration >= 1 and d.human is not None and d.human[0] > 0.1)
         assert decision.driver == "human"
         assert decision.human == pytest.approx((0.5, 0.0), abs=0.01)
         assert newest(applied, lambda a: a.source is Source.TELEOP).twist.linear_m_s > 0.0
