@@ -119,8 +119,19 @@ def test_the_emergency_stop_is_said_once_and_takes_the_hand_off(button):
 
 
 def test_the_emergency_stop_works_from_every_state_and_from_a_pad_that_seems_frozen():
-    for hand in (Hand(PS3), ready(), driving()):
+    locked = Hand(PS3)
+    locked.update(AHEAD, 0.0)
+    for hand in (locked, ready(), driving()):
         assert hand.update(pad("BTN_MODE"), 1.0, False).estop is True
+
+
+def test_the_ps_button_that_switches_the_pad_on_is_no_emergency_stop():
+    hand = Hand(PS3)
+    hand.update(None, 0.0)
+    assert hand.update(pad("BTN_MODE"), 1.0).estop is None
+    assert hand.update(pad("BTN_MODE"), 1.1).estop is None
+    hand.update(REST, 1.2)
+    assert hand.update(pad("BTN_MODE"), 1.3).estop is True
 
 
 def test_start_held_releases_the_emergency_stop_once():

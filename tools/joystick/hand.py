@@ -97,6 +97,7 @@ class Hand:
         self._mapping = mapping
         self._state = State.LOCKED
         self._since_s = 0.0
+        self._is_there = False
         self._stop_held = False
         self._release_since_s: float | None = None
 
@@ -141,7 +142,9 @@ class Hand:
     def _estop(self, pad: PadState | None, now_s: float) -> bool | None:
         """The edge of a press, or of a release that has been held long enough with the hand off the wheel."""
         held = pad is not None and any(pad.holds(name) for name in self._mapping.estop)
-        pressed, self._stop_held = held and not self._stop_held, held
+        # PS also switches a pad on: one that comes with it held has not been asked to stop.
+        pressed = held and not self._stop_held and self._is_there
+        self._stop_held, self._is_there = held, pad is not None
         if pressed:
             self._release_since_s = None
             return True
