@@ -12,11 +12,11 @@ from sim_backend.layout import build
 from tools.cli import main
 from tools.world_picture import FREE_M, LETTERS, OUTLINE, WIDE_PX, draw, from_above, view_poses
 
-DOCS = Path(__file__).parents[2] / "docs" / "worlds"
+PICTURES = Path(__file__).parents[2] / "sim_backend" / "pictures"
 
 
-def test_every_world_has_a_small_picture_in_the_docs():
-    pictures = {path.stem: path.stat().st_size for path in DOCS.glob("*.png")}
+def test_every_world_has_a_small_picture():
+    pictures = {path.stem: path.stat().st_size for path in PICTURES.glob("*.png")}
     assert set(pictures) == set(known_worlds())
     assert max(pictures.values()) < 100_000
 
