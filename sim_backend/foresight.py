@@ -19,7 +19,7 @@ from sim_backend.world import World
 
 # A box's corner can hide between two looks at the clearance that are farther apart than this.
 LOOK_PERIOD_S = 0.1
-# Boxes whose centre is farther than this from all that can be reached are left out.
+# Boxes of which no part comes nearer than this to what can be reached are left out.
 CARE_M = 2.0
 
 
