@@ -1,6 +1,8 @@
 """The estimate of the robot's clock."""
 
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from hal.clock import WINDOW_S, ClockEstimate
 
@@ -20,6 +22,17 @@ def test_it_is_never_ahead_of_a_robot_whose_time_runs_as_ours():
         local_s = step * 0.05
         clock.note(local_s - 5.0 - 0.01 * (step % 7), local_s)
         assert clock.now(local_s) <= local_s - 5.0 + 1e-9
+
+
+@given(st.lists(st.tuples(st.floats(0.0, 2.0), st.floats(0.0, 5.0)), min_size=1, max_size=40), st.floats(0.0, 1.0))
+def test_no_delays_make_a_command_look_younger_than_it_is(messages, later_s):
+    """Every message left the robot before it came: whatever the delays, the estimate stays behind the robot's clock."""
+    clock, local_s = ClockEstimate(), 100.0
+    for passed_s, delay_s in messages:
+        local_s += passed_s
+        clock.note(local_s + 7.0 - delay_s, local_s)
+        assert clock.now(local_s) <= local_s + 7.0 + 1e-9
+    assert clock.now(local_s + later_s) <= local_s + later_s + 7.0 + 1e-9
 
 
 def test_it_follows_a_robot_whose_time_runs_slower():
