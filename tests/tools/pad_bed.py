@@ -19,7 +19,8 @@ PAD_KEYS = sorted(BUTTONS[name] for name in PS3.buttons)
 PAD_AXES = (0, 1, 2, 3, 4, 5)
 SONY = "Sony PLAYSTATION(R)3 Controller"
 ADDRESS = "00:11:22:33:44:55"
-MOTION_S = 0.01
+# Mostly dense, with pauses: from these the bridge learns a patience that outlasts a test machine's own stalls.
+MOTION_S, PAUSE_S, PAUSE_EVERY = 0.005, 0.08, 10
 FULL_BYTES = 1000  # a node that nobody reads takes no more
 EVENT = struct.Struct("@llHHi")
 
@@ -125,8 +126,8 @@ class Bed:
 
     def _talk(self) -> None:
         value = 0
-        while not self._end.wait(MOTION_S):
-            value = (value + 1) % 7
+        while not self._end.wait(MOTION_S if value else PAUSE_S):
+            value = (value + 1) % PAUSE_EVERY
             with self._lock:
                 for number in tuple(self._chatty):
                     if self._unread(number) < FULL_BYTES:
