@@ -6,7 +6,7 @@ wheels had zero, how far the robot went, how many stale commands it obeyed, and 
 status is 1 if any row fails.
 
 examples:
-  lira stop-test                        the whole matrix, about five minutes
+  lira stop-test                        the whole matrix, about six minutes
   lira stop-test --quick                a part of it, once each, in a minute
   lira stop-test --only lidar           the rows with that word in their name
   lira stop-test --json -               one JSON object on standard output
