@@ -72,6 +72,7 @@ def test_twin_and_joystick_drive_with_nothing_else_running(bed, hand, watch):
     start_m = newest(state, lambda s: s.progress_m >= 0.0).progress_m
     bed.key(PAD, "BTN_TL", 1)
     hand.wait_ready("you drive", 10.0)
+    newest(applied, lambda a: a.source is Source.TELEOP)
     bed.axis(PAD, "ABS_Y", 0)
     assert newest(state, lambda s: s.progress_m > start_m + 0.3).linear_m_s > 0.3
     bed.key(PAD, "BTN_TL", 0)
@@ -87,6 +88,7 @@ def test_a_press_takes_the_wheel_from_the_learner_which_labels_it(bed, hand, wat
         assert newest(decisions, lambda d: d.experts, READY_S).labels.demonstration == 0
         bed.key(PAD, "BTN_TL", 1)
         hand.wait_ready("you drive", 10.0)
+        newest(applied, lambda a: a.source is Source.TELEOP)
         bed.axis(PAD, "ABS_Y", 0)
         # Before the first training step the human demonstrates, from the press on: at first with the stick centred.
         decision = newest(decisions, lambda d: d.labels.demonstration >= 1 and d.human is not None and d.human[0] > 0.1)

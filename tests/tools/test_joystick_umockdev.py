@@ -91,6 +91,7 @@ class Rig:
         """Hold the dead-man with the stick at rest, then go."""
         self.bed.key(PAD, "BTN_TL", 1)
         self.says("you drive")
+        self.drives(0.0)
         self.bed.axis(PAD, "ABS_Y", 0)
         self.drives(0.5)
 
@@ -178,6 +179,7 @@ def test_unplugged_it_stands_at_once_and_the_same_pad_takes_it_up_again(rig):
     rig.says("ready: hold the dead-man", times=2)
     rig.bed.key(back, "BTN_TL", 1)
     rig.says("you drive", times=2)
+    rig.drives(0.0)
     rig.bed.axis(back, "ABS_Y", 0)
     rig.drives(0.5)
     assert "Another pad" not in rig.process.output()
@@ -213,6 +215,7 @@ def test_the_emergency_stop_and_its_release(rig, bus):
     assert not look_at_estop(bus).pressed
     rig.bed.key(PAD, "BTN_TL", 1)
     rig.says("you drive", times=2)
+    rig.drives(0.0)
     rig.bed.axis(PAD, "ABS_Y", 0)
     rig.drives(0.5)
 
