@@ -2,7 +2,7 @@
 PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
-BENCHES := twin lockstep latency train preprocess drivers
+BENCHES := twin lockstep latency train preprocess drivers takeover
 
 .PHONY: setup demo test check bench clean
 

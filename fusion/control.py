@@ -11,6 +11,9 @@ from hal.messages import STOP, Action, Applied, Command, CourseState, Observatio
 from hal.port import Robot
 from hal.profile import Base
 
+# A robot that stopped by itself is armed by the next zero; that has to be a person's, not that of a stale sensor.
+HELD = frozenset({Reason.STALE, Reason.NEUTRAL_FIRST, Reason.REFUSED, Reason.ESTOP})
+
 
 class Teacher(Protocol):
     """Whoever can take the wheel: a script here; a person does the same with a gamepad, from outside."""
@@ -57,6 +60,7 @@ class ControlLoop:
         self._period_s = robot.profile.period_s
         self._deadline_s = robot.now()
         self._preprocess = Preprocessor(robot.profile)
+        self._reason = Reason.OK  # why the robot did what it did last
         self._taught = False  # whether the teacher held the wheel at the last step
         self.refused = 0  # observations that could not be used
         self.trouble = ""  # what was wrong with the newest observation
@@ -72,7 +76,8 @@ class ControlLoop:
         observation = self._robot.read()
         features = self._features(observation)
         if features is None:
-            self._command(STAND, observation.seq)
+            if self._reason not in HELD:
+                self._command(STAND, observation.seq)
             self._keep_time()
             return None
         proposal = method.propose(features)
@@ -108,7 +113,9 @@ class ControlLoop:
         self._taught = action is not None
 
     def _command(self, action: Action, answers: int) -> Applied:
-        return self._robot.drive(Command(to_twist(action, self._base), self._robot.now(), answers=answers))
+        applied = self._robot.drive(Command(to_twist(action, self._base), self._robot.now(), answers=answers))
+        self._reason = applied.reason
+        return applied
 
     def _learn(self, method: Method, proposal: Proposal, applied: Applied) -> Lesson:
         """Learn from what was applied, not from what was wished for: nothing if the robot was held."""

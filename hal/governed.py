@@ -5,7 +5,7 @@ from dataclasses import replace
 
 from hal.field import measure_clearance
 from hal.governor import Governor, State
-from hal.messages import Applied, Command, LaserScan, Observation
+from hal.messages import Applied, Command, LaserScan, Observation, Reason
 from hal.port import Robot
 from hal.profile import RobotProfile
 
@@ -119,4 +119,6 @@ class GovernedRobot:
             self._governor.halt()
             allowed = self._governor.tick(self._robot.now())
             got = self._robot.drive(Command(allowed.twist, allowed.stamp_s))
-        return replace(allowed, twist=got.twist, clamps=allowed.clamps + got.clamps)
+        # What is allowed may still not happen: a base that lost a device says why it stands.
+        reason = got.reason if allowed.reason is Reason.OK else allowed.reason
+        return replace(allowed, twist=got.twist, reason=reason, clamps=allowed.clamps + got.clamps)

@@ -40,6 +40,7 @@ class RealTimeLink:
         self._publishers = {Source.POLICY: bus.publisher(CMD_VEL), Source.TELEOP: bus.publisher(TELEOP)}
         self._clock = ClockEstimate()
         self._epoch = -1
+        self._own_epoch = bus.epoch
         self._newest: Applied | None = None
         self._held: dict[Source, Command] = {}
         self._repeat_s = 0.0
@@ -103,6 +104,8 @@ class RealTimeLink:
             newest = self._newest
         if newest is None or now_s - newest.stamp_s > APPLIED.max_age_s:
             return Applied(STOP, now_s)
+        if Source.POLICY == command.source == newest.source and newest.epoch != self._own_epoch:
+            return Applied(STOP, newest.stamp_s, reason=Reason.REFUSED)  # somebody else drives
         return newest
 
     def wait(self, until_s: float) -> None:

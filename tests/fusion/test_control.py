@@ -186,3 +186,21 @@ def test_a_reading_that_cannot_be_used_is_counted_and_stops_the_robot(null):
     assert loop.refused == 1
     assert "wrong length" in loop.trouble
     assert robot.state().linear_m_s == 0.0
+
+
+def test_a_stale_sensor_does_not_arm_a_robot_that_stopped_by_itself(null):
+    robot = GovernedRobot(null)
+    robot.open()
+    loop, driver = ControlLoop(robot), Driver()
+    loop.arm()
+    assert loop.step(driver).applied.reason is Reason.OK
+    null.wait(robot.now() + 1.0)  # nobody commands for so long that the watchdog strikes
+    assert loop.step(driver).applied.reason in (Reason.STALE, Reason.NEUTRAL_FIRST)
+
+    whole, null.read = null.read, lambda: replace(whole(), scan=None)
+    for _ in range(3):
+        assert loop.step(driver) is None
+    null.read = whole
+    held = loop.step(driver).applied
+    assert (held.twist, held.source) == (Twist(0.0, 0.0), Source.NONE)
+    robot.close()
