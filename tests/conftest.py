@@ -1,9 +1,17 @@
-"""In CI (`CI=true`) a skipped test fails unless its reason is expected: a suite that skips itself proves nothing."""
+"""In CI (`CI=true`) a skipped test fails unless its reason is expected: a suite that skips itself proves nothing.
+
+Property tests try the same examples in every run; `pytest --hypothesis-profile=explore` looks for new ones.
+"""
 
 import os
 from collections.abc import Generator
 
 import pytest
+from hypothesis import settings
+
+settings.register_profile("steady", derandomize=True)
+settings.register_profile("explore")
+settings.load_profile("steady")
 
 # Contract tests that have no meaning for one of the adapters.
 EXPECTED_SKIPS = {
@@ -23,7 +31,6 @@ def fail_if_unexpected(report: pytest.TestReport | pytest.CollectReport) -> None
 
 
 if os.environ.get("CI") == "true":
-
     @pytest.hookimpl(wrapper=True)
     def pytest_runtest_makereport() -> Generator[None, pytest.TestReport, pytest.TestReport]:
         """Judge the skips of tests."""

@@ -65,11 +65,12 @@ def test_however_it_is_cut_the_frames_are_the_same(cuts):
 @settings(max_examples=80, deadline=None)
 @given(at=st.integers(0, len(STREAM) - 800), count=st.integers(1, 100), garbage=st.binary(max_size=100))
 def test_losses_and_garbage_cost_only_the_frames_they_hit(at, count, garbage):
-    frames, lost, _ = feed([STREAM[:at], garbage + STREAM[at + count :]])
-    assert all(frame in FRAMES for frame in frames)
+    damaged = STREAM[:at] + garbage + STREAM[at + count :]
+    frames, lost, _ = feed([damaged[:at], damaged[at:]])
+    assert sum(frame not in FRAMES for frame in frames) <= 1  # a sum of 8 bits lets one broken frame in 256 through
     assert len(frames) >= len(FRAMES) - 12
     assert frames[-1] == FRAMES[-1]
-    assert lost > 0 or len(frames) < len(FRAMES)
+    assert damaged == STREAM or lost > 0 or frames != FRAMES
 
 
 @settings(max_examples=80, deadline=None)

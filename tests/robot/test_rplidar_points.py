@@ -110,8 +110,10 @@ def test_lost_bytes_cost_a_few_packets_and_are_counted(name, at, count):
     parse, (data, theta, distance), size = STREAMS[name]
     at %= len(data) - 8 * size
     got_theta, got_distance, lost, left = feed(parse, [data[:at] + data[at + count :]])
-    assert true_points(got_theta, got_distance, theta, distance) >= len(got_theta) - 2
     per_packet = len(theta) / (len(data) / size)
+    # Whole packets vanish without a trace: the packet before them is stretched over the gap.
+    stretched = per_packet if count % size == 0 else 0
+    assert true_points(got_theta, got_distance, theta, distance) >= len(got_theta) - 2 - stretched
     gone = (count // size + 6) * per_packet + 6
     assert len(got_theta) >= len(theta) - gone - 40
     if count % size:
