@@ -31,6 +31,7 @@ def fail_if_unexpected(report: pytest.TestReport | pytest.CollectReport) -> None
 
 
 if os.environ.get("CI") == "true":
+
     @pytest.hookimpl(wrapper=True)
     def pytest_runtest_makereport() -> Generator[None, pytest.TestReport, pytest.TestReport]:
         """Judge the skips of tests."""
