@@ -4,10 +4,14 @@ Property tests try the same examples in every run; `pytest --hypothesis-profile=
 """
 
 import os
+import signal
 from collections.abc import Generator
 
 import pytest
 from hypothesis import settings
+
+# A shell that runs the suite in the background ignores SIGINT, and so would every process that a test starts.
+signal.signal(signal.SIGINT, signal.default_int_handler)
 
 settings.register_profile("steady", derandomize=True)
 settings.register_profile("explore")

@@ -4,6 +4,7 @@ import os
 import signal
 import subprocess
 import sys
+import time
 from pathlib import Path
 
 import pytest
@@ -97,6 +98,8 @@ except KeyboardInterrupt:
     with subprocess.Popen(python(code)) as parent:
         while len(pids.read_text().split() if pids.exists() else []) < 2:
             assert parent.poll() is None
+            time.sleep(0.02)
+        time.sleep(0.5)  # both run; now the parent has had the time to know it, too
         parent.send_signal(number)
         assert parent.wait(30) == 130
     for pid in map(int, pids.read_text().split()):
