@@ -6,7 +6,7 @@ from dataclasses import replace
 from hal.field import measure_clearance
 from hal.governor import Governor, State
 from hal.messages import Applied, Command, LaserScan, Observation, Reason
-from hal.port import Robot
+from hal.port import MotorSwitch, Robot
 from hal.profile import RobotProfile
 
 SLICE_S = 0.05  # the watchdog looks at least this often while the robot's time passes in `wait`
@@ -23,6 +23,8 @@ class GovernedRobot:
     def __init__(self, robot: Robot) -> None:
         self._robot = robot
         self._governor = Governor(robot.profile)
+        self._switch = robot if isinstance(robot, MotorSwitch) else None
+        self._cut = False  # the motors' power, by the emergency stop
         self._scan: LaserScan | None = None  # that the field saw last
         self._lock = threading.Lock()
 
@@ -119,6 +121,14 @@ class GovernedRobot:
             self._governor.halt()
             allowed = self._governor.tick(self._robot.now())
             got = self._robot.drive(Command(allowed.twist, allowed.stamp_s))
+        self._switch_motors()
         # What is allowed may still not happen: a base that lost a device says why it stands.
         reason = got.reason if allowed.reason is Reason.OK else allowed.reason
         return replace(allowed, twist=got.twist, reason=reason, clamps=allowed.clamps + got.clamps)
+
+    def _switch_motors(self) -> None:
+        """Cut the motors' power while the emergency stop holds, where there is a switch; zero was commanded before."""
+        emergency = self._governor.state is State.EMERGENCY
+        if self._switch is not None and emergency is not self._cut:
+            self._switch.cut_motors(emergency)
+            self._cut = emergency

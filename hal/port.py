@@ -1,6 +1,6 @@
 """The port that every robot fits: physical, twin, remote, null. The code that drives one drives them all."""
 
-from typing import Protocol
+from typing import Protocol, runtime_checkable
 
 from hal.messages import Applied, Command, CourseState, Episode, Observation
 from hal.profile import RobotProfile
@@ -34,6 +34,14 @@ class Robot(Protocol):
 
     def close(self) -> None:
         """Stop the wheels, then let go of the devices. May be called twice."""
+
+
+@runtime_checkable
+class MotorSwitch(Protocol):
+    """What a robot may have beside the port: a way to take the motors' power away, whatever they are commanded."""
+
+    def cut_motors(self, off: bool) -> None:
+        """Cut the power, or give it back. Returns at once; may be called from any thread."""
 
 
 class Arena(Protocol):

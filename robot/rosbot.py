@@ -36,7 +36,7 @@ class Devices:
 
 
 class Rosbot:
-    """Implements `hal.port.Robot`. Its clock is the monotonic clock.
+    """Implements `hal.port.Robot` and `MotorSwitch`. Its clock is the monotonic clock.
 
     A device that is lost is opened again by itself; meanwhile, and until the first zero command afterwards, the wheels
     stand, and `Applied.clamps` says why: "no_lidar", "no_camera", "no_base", "neutral_first".
@@ -135,7 +135,7 @@ class Rosbot:
             keeper.close()
 
     def cut_motors(self, off: bool) -> None:
-        """Take the motors' power away in the firmware, or give it back: a second emergency stop."""
+        """Take the motors' power away in the firmware, or give it back: a second emergency stop, below ours."""
         self.base.cut_motors(off)
 
     def troubles(self) -> dict[str, str]:

@@ -6,6 +6,7 @@ from typing import Any
 from hal.errors import DeviceError, SensorError
 from hal.messages import BatteryState, Imu, Odometry, Range
 from robot.core2 import messages
+from robot.core2.errands import Errands
 from robot.core2.rosserial import Frame, Id, TopicInfo, encode_frame, encode_strings, encode_time, parse_topic_info
 from robot.core2.wheels import Reckoner
 from robot.settings import BaseSettings
@@ -35,6 +36,7 @@ class Board:
         self.unreadable = 0  # messages that did not decode
         self.answers: list[str] = []  # of the service `config`
         self.log: list[str] = []
+        self._errands = Errands()
         self.forget()
 
     def forget(self) -> None:
@@ -44,6 +46,7 @@ class Board:
         self.cmd_vel: int | None = None
         self._config: int | None = None
         self._config_answers: int | None = None
+        self._errands.forget()
         self._reckoner.rebase()
 
     @property
@@ -58,11 +61,16 @@ class Board:
         """Whether it can be driven and configured."""
         return not self.missing and self._config is not None
 
-    def configure(self, command: str, data: str = "") -> bytes:
-        """Call the board's service `config`; its answer comes into `answers`. Only once it is `ready`."""
-        if self._config is None:
-            raise DeviceError("the base board announced no service 'config'", FIRMWARE)
-        return encode_frame(self._config, encode_strings(command, data))
+    def configure(self, command: str, data: str = "") -> None:
+        """Have the board's service `config` called, until it answers; what it says comes into `answers`."""
+        self._errands.want(command, data)
+
+    def calls(self, now_s: float) -> bytes:
+        """Return what has to be sent now for `configure`; nothing before the board is `ready`."""
+        config = self._config
+        if config is None:
+            return b""
+        return self._errands.due(now_s, lambda *texts: encode_frame(config, encode_strings(*texts)))
 
     def handle(self, frame: Frame, now_s: float) -> bytes:
         """Learn from a frame that came at `now_s`. Raises `DeviceError` for a board that speaks another language."""
@@ -74,6 +82,7 @@ class Board:
             self.log = [*self.log[-19:], frame.payload[5:].decode("utf-8", "replace")]
         elif frame.topic == self._config_answers:
             self.answers = [*self.answers[-19:], frame.payload[4:-1].decode("utf-8", "replace")]
+            self._errands.answered()
         elif frame.topic in self._layouts:
             self._read(*self._layouts[frame.topic], frame.payload, now_s)
         return b""

@@ -25,6 +25,7 @@ ASK_S = 1.0
 SILENCE_S = 1.0  # then it may have been reset, and knows us no more
 LOST_S = 10.0
 POWER = "Check its power switch, and that the path is the base's."
+BRAKE_S = 0.3  # a wheel without power rolls on: the firmware's ramp brakes it before the power is cut
 FAREWELL = 3  # zeros, in case one gets lost
 
 
@@ -54,6 +55,7 @@ class Core2:
         self._until_s = -math.inf
         self._news = threading.Event()
         self._motors_off = False
+        self._power_until_s = -math.inf
         self._motors_told: bool | None = None
         self._answers = False
         self.baud: int | None = None
@@ -80,8 +82,10 @@ class Core2:
             self._news.set()
 
     def cut_motors(self, off: bool) -> None:
-        """Take the motors' power away, or give it back: a second emergency stop, in the firmware."""
-        self._motors_off = off
+        """Stop, and take the motors' power away once the wheels have braked; or give it back. In the firmware."""
+        with self._lock:
+            self._power_until_s = time.monotonic() + BRAKE_S
+            self._motors_off = off
         self._news.set()
 
     def session(self, stop: threading.Event, begin: Callable[[], None]) -> None:
@@ -140,7 +144,7 @@ class Core2:
                     asked_s = now_s
                     line.write(ASK_TOPICS)
             elif not self._answers:
-                self._begin(line)
+                self._begin()
                 due_s = now_s
                 if not begun:
                     begin()
@@ -155,15 +159,15 @@ class Core2:
         parsed = parse_frames(buffer)
         self.counts.lost_bytes += parsed.lost
         self.counts.frames += len(parsed.frames)
-        answer = b"".join(self._board.handle(frame, now_s) for frame in parsed.frames)
+        answer = b"".join(self._board.handle(frame, now_s) for frame in parsed.frames) + self._board.calls(now_s)
         if answer:
             line.write(answer)
         return buffer[parsed.consumed :], bool(parsed.frames)
 
-    def _begin(self, line: Line) -> None:
+    def _begin(self) -> None:
         """The board is ready: its watchdog on, its motors as they shall be."""
         self.counts.negotiations += 1
-        line.write(self._board.configure("EWCH", "1"))
+        self._board.configure("EWCH", "1")
         self._motors_told = None
         self._answers = True
 
@@ -171,13 +175,14 @@ class Core2:
         """Send what is wanted now."""
         self._news.clear()
         with self._lock:
-            twist = self._twist if now_s <= self._until_s and not self._motors_off else STOP
+            off, braked = self._motors_off, now_s >= self._power_until_s
+            twist = self._twist if now_s <= self._until_s and not off else STOP
         assert self._board.cmd_vel is not None
         line.write(encode_frame(self._board.cmd_vel, messages.encode_twist(twist)))
         self.counts.commands += 1
-        if self._motors_told is not self._motors_off:
-            self._motors_told = self._motors_off
-            line.write(self._board.configure("EMOT", "0" if self._motors_off else "1"))
+        if self._motors_told is not off and (braked or not off):
+            self._motors_told = off
+            self._board.configure("EMOT", "0" if off else "1")
 
     def _say_farewell(self, line: Line) -> None:
         """Leave the wheels at zero, as far as the board can be reached."""

@@ -110,3 +110,30 @@ def test_what_the_base_cuts_is_reported():
     applied = robot.drive(Command(Twist(9.0, 0.0), 0.0))
     assert applied.twist == Twist(PROFILE.base.max_linear_m_s / 2, 0.0)
     assert applied.clamps == ("linear", "base")
+
+
+class Switched(NullRobot):
+    """A robot whose motors have a switch; notes what it was told, and how fast the wheels went then."""
+
+    def __init__(self):
+        super().__init__(PROFILE)
+        self.told = []
+
+    def cut_motors(self, off):
+        self.told.append((off, self.state().linear_m_s))
+
+
+def test_the_emergency_stop_takes_the_motors_power_after_the_zero_and_the_release_gives_it_back():
+    switched = Switched()
+    robot = GovernedRobot(switched)
+    robot.drive(Command(STOP, 0.0))
+    robot.drive(Command(GO, 0.0))
+    robot.press_estop()
+    assert switched.told == [(True, 0.0)]
+    robot.tick()
+    robot.halt()
+    robot.press_estop()
+    assert switched.told == [(True, 0.0)]
+    robot.release_estop()
+    assert switched.told == [(True, 0.0), (False, 0.0)]
+    assert robot.drive(Command(GO, 0.0)).reason is Reason.NEUTRAL_FIRST
