@@ -26,6 +26,14 @@ class Twist:
 STOP = Twist(0.0, 0.0)
 
 
+@dataclass(frozen=True, slots=True)
+class TwistStamped:
+    """geometry_msgs/TwistStamped: what newer ROS 2 controllers want instead; `stamp_s` is when it was decided."""
+
+    stamp_s: float
+    twist: Twist
+
+
 class Source(StrEnum):
     """Who a command comes from, or who drives."""
 

@@ -12,64 +12,21 @@ from hal.codec import decode, encode, ros_type_of
 from hal.errors import CodecError
 from hal.messages import (
     Applied,
-    BatteryState,
-    Bool,
     Clock,
     CompressedImage,
-    CourseState,
-    Decision,
-    DiagnosticArray,
-    DiagnosticStatus,
-    ExpertView,
     Image,
     Imu,
-    Joy,
-    JoyFeedback,
-    LabelCounts,
     LaserScan,
     Odometry,
-    Range,
     Reason,
-    Source,
     Twist,
+    TwistStamped,
 )
 from hal.outlet import compress
 from hal.ros import CODECS, TYPES, definition
+from tools.bench.samples import DECISION, INF, MESSAGES, NAN, of_kind
 
-NAN, INF = math.nan, math.inf
-EXPERTS = (ExpertView("camera", (0.5, -1.0), 0.07, True), ExpertView("lidar", (1.0, 0.25), 0.0, False))
-DECISION = Decision(
-    7.25, 12, "camera", "attention", (0.5, -1.0), (0.25, 0.0), None, EXPERTS, 0.06, LabelCounts(1, 2, 3, 4, 5), 2, 3, 4
-)
-MESSAGES = [
-    Twist(0.5, -1.5),
-    Twist(NAN, INF),
-    Clock(1.25),
-    Applied(Twist(0.1, 0.2), 3.5),
-    Applied(Twist(0.1, 0.2), 3.5, Source.TELEOP, Reason.OK, ("linear", "angular"), 77, 0.125, 2**64 - 1, 9),
-    LaserScan(2.5, -1.0, 0.25, 0.0625, 4.0, np.array([1.0, INF, -INF, NAN, 0.5], np.float32), 0.125, 0.25),
-    LaserScan(2.5, -1.0, 0.25, 0.0625, 4.0, np.empty(0, np.float32)),
-    Image(1.0, np.arange(24, dtype=np.uint8).reshape(2, 4, 3)),
-    Image(1.0, np.arange(6, dtype=np.uint8).reshape(2, 3), "mono8"),
-    CompressedImage(1.0, b"\xff\xd8 not really \xff\xd9", "jpeg"),
-    Odometry(1.5, 1.0, -2.0, 0.75, 0.5, -0.25),
-    Odometry(1.5, NAN, INF, 0.75, NAN, -0.25),
-    Imu(1.5, -0.75, 0.5, 9.0, -9.0),
-    Range(1.5, "range_fl", 0.5, 0.03125, 0.875),
-    Range(1.5, "range_rr", INF, 0.03125, 0.875),
-    BatteryState(1.5, 11.5),
-    CourseState(1.5, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, -0.5, 0.25, True, False, True),
-    CourseState(1.5, 1.0, 2.0, 3.0, 4.0, 5.0, NAN, NAN, INF),
-    DECISION,
-    Decision(
-        7.25, 12, "human", "none", (0.5, -1.0), (0.25, 0.0), (0.5, -1.0), (), 0.06, LabelCounts(), 0, 0, 0, "x", 3
-    ),
-    DiagnosticArray(1.5, (DiagnosticStatus(1, "a", "b", (("c", "d"),)), DiagnosticStatus(0, "e", "f"))),
-    Bool(True),
-    Joy(1.5, (0.5, -1.0), (1, 0, 1)),
-    JoyFeedback(JoyFeedback.TYPE_RUMBLE, 10, 0.5),
-    Bool(False),
-]
+SCAN = of_kind(LaserScan)[0]
 
 
 def fields(message: object) -> list[object]:
@@ -106,7 +63,7 @@ def test_an_independent_decoder_reads_every_message(message):
 
 
 def test_an_independent_decoder_reads_the_same_values():
-    scan = independent(MESSAGES[5])
+    scan = independent(SCAN)
     assert scan.header.stamp.sec == 2
     assert scan.header.stamp.nanosec == 500_000_000
     assert repr(list(scan.ranges)) == "[1.0, inf, -inf, nan, 0.5]"
@@ -121,17 +78,17 @@ def test_an_independent_decoder_reads_the_same_values():
         ("lidar", [1.0, 0.25], False),
     ]
     assert (decision.has_human, decision.labels.demonstration, decision.phase) == (False, 5, "train")
-    applied = independent(MESSAGES[4])
+    applied = independent(of_kind(Applied)[1])
     assert (list(applied.clamps), applied.answers, applied.reason) == (["linear", "angular"], 77, "ok")
-    odometry = independent(MESSAGES[10])
+    odometry = independent(of_kind(Odometry)[0])
     assert odometry.pose.pose.orientation.z == pytest.approx(math.sin(0.375))
     assert odometry.twist.twist.angular.z == -0.25
 
 
 def test_big_endian_senders_are_read():
-    ros = TYPES.deserialize_cdr(encode(MESSAGES[5]), "sensor_msgs/msg/LaserScan")
+    ros = TYPES.deserialize_cdr(encode(SCAN), "sensor_msgs/msg/LaserScan")
     data = bytes(TYPES.serialize_cdr(ros, "sensor_msgs/msg/LaserScan", little_endian=False))
-    assert fields(decode(LaserScan, data)) == fields(MESSAGES[5])
+    assert fields(decode(LaserScan, data)) == fields(SCAN)
 
 
 def test_a_stamp_survives_to_the_nanosecond():
@@ -172,7 +129,7 @@ def test_a_png_with_a_part_longer_than_itself_is_refused():
 
 
 def test_an_image_that_lies_about_its_size_is_refused():
-    ros = TYPES.deserialize_cdr(encode(MESSAGES[7]), "sensor_msgs/msg/Image")
+    ros = TYPES.deserialize_cdr(encode(of_kind(Image)[0]), "sensor_msgs/msg/Image")
     ros.height = 2**31
     with pytest.raises(CodecError):
         decode(Image, bytes(TYPES.serialize_cdr(ros, "sensor_msgs/msg/Image")))
@@ -207,3 +164,10 @@ def test_garbage_is_a_codec_error_and_nothing_else(message):
         except CodecError:
             refused += 1
     assert refused > 0
+
+
+def test_a_velocity_with_a_stamp_is_never_taken_for_one_without_or_the_other_way_round():
+    with pytest.raises(CodecError):
+        decode(Twist, encode(TwistStamped(2.5, Twist(0.5, -1.5))))
+    with pytest.raises(CodecError):
+        decode(TwistStamped, encode(Twist(0.5, -1.5)))

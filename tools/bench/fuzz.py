@@ -18,37 +18,16 @@ from hal.attachment import Attachment, parse_attachment
 from hal.codec import decode, encode
 from hal.desk import REALTIME, Info, info_from_json
 from hal.errors import LiraError
-from hal.messages import (
-    Action,
-    Applied,
-    BatteryState,
-    Bool,
-    Clock,
-    CompressedImage,
-    CourseState,
-    Decision,
-    DiagnosticArray,
-    DiagnosticStatus,
-    Episode,
-    ExpertView,
-    Image,
-    Imu,
-    Joy,
-    JoyFeedback,
-    LabelCounts,
-    LaserScan,
-    Odometry,
-    Range,
-    Twist,
-)
+from hal.messages import CompressedImage, Episode, Image
 from hal.outlet import compress
 from hal.profile import load_profile, profile_from_json
+from hal.ros import CODECS
 from tools.bench import Row
+from tools.bench.samples import of_kind
 
 INPUTS = 100_000
 SEED = 1
 LONGEST = 300
-MOVE: Action = (0.5, -0.5)
 SLOW_S = 0.5  # an input that takes longer could hold up whoever decodes it
 
 
@@ -62,37 +41,12 @@ class Target:
     valid: tuple[bytes, ...]
 
 
-def messages() -> list[object]:
-    """One of each kind that travels."""
-    image = Image(1.0, np.arange(48, dtype=np.uint8).reshape(4, 4, 3))
-    expert = ExpertView("camera", MOVE, 0.1, active=True)
-    return [
-        Twist(0.5, -0.5),
-        Applied(Twist(0.5, 0.0), 1.0, clamps=("linear",)),
-        Bool(True),
-        Clock(1.0),
-        LaserScan(1.0, -1.0, 0.1, 0.1, 4.0, np.ones(20, np.float32)),
-        image,
-        compress(image, "png"),
-        Odometry(1.0, 1.0, 2.0, 0.5, 0.1, 0.1),
-        Imu(1.0, 0.5, 0.1, 0.0, 0.0),
-        Range(1.0, "range_fl", 0.5, 0.03, 0.9),
-        BatteryState(1.0, 12.0),
-        DiagnosticArray(1.0, (DiagnosticStatus(1, "link", "one link", (("links", "1"),)),)),
-        Joy(1.0, (0.5, -0.5), (1, 0)),
-        JoyFeedback(JoyFeedback.TYPE_RUMBLE, 0, 0.5),
-        CourseState(1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0),
-        Decision(1.0, 1, "novice", "none", MOVE, MOVE, None, (expert,), 0.06, LabelCounts(), 0, 0, 0),
-    ]
-
-
 def targets() -> list[Target]:
     """Everything that takes bytes off the bus."""
     profile = load_profile("rosbot2")
     json_errors = (msgspec.MsgspecError, ValueError)
     found = [
-        Target(type(message).__name__, partial(decode, type(message)), (LiraError,), (encode(message),))
-        for message in messages()
+        Target(kind.__name__, partial(decode, kind), (LiraError,), tuple(map(encode, of_kind(kind)))) for kind in CODECS
     ]
     picture = Image(1.0, np.full((48, 64, 3), 90, np.uint8))
     pictures = tuple(compress(picture, encoding).data for encoding in ("jpeg", "png"))
