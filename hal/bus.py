@@ -21,6 +21,7 @@ from hal.attachment import Attachment, parse_attachment
 from hal.codec import decode, encode
 from hal.errors import BusError, CodecError, ConfigError
 from hal.keys import Keys, keys_from_environment
+from hal.refusals import Refusals
 from hal.topics import Qos, Topic
 
 M = TypeVar("M")
@@ -134,6 +135,7 @@ class Bus:
 
     Peers hear the robot, not one another. With `watch` a session hears what all of them say, through the robot and
     over one link: for consoles and the like, not for driving; nobody there to connect to is a `BusError` then.
+    `refusals` is what counts those whom keys keep out, for whoever reports it.
 
     Raises `BusError` if the port is taken, `ConfigError` for a bad name, endpoint or keys.
     """
@@ -147,12 +149,14 @@ class Bus:
         keys: Keys | None = None,
         insecure: bool = False,
         watch: bool = False,
+        refusals: Refusals | None = None,
     ) -> None:
         if not re.fullmatch(r"[A-Za-z][A-Za-z0-9_]*", robot):
             raise ConfigError(f"'{robot}' is no name for a robot", "Use letters, digits and underscores, as in ROS.")
         self.robot = robot
         self.endpoint = listen or connect or ""
         self.epoch = secrets.randbits(64)
+        self.refusals = refusals or Refusals()
         keys = keys or keys_from_environment()
         self.encrypted = keys is not None
         if listen and not (self.encrypted or insecure or _is_loopback(listen)):

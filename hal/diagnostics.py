@@ -9,11 +9,13 @@ from hal.governed import GovernedRobot
 from hal.governor import State
 from hal.inlet import Inlet
 from hal.messages import DiagnosticArray, DiagnosticStatus
+from hal.refusals import LINK
 from hal.topics import DIAGNOSTICS
 
 OK, WARN = 0, 1
 PATIENCE_S = 3.0  # a peer that has just come has one link for a moment
 NO_DATAGRAMS = "UDP does not get through: over TCP alone commands queue up in a gap of the radio (check the firewall)"
+STRANGER = "somebody without a valid certificate tries to connect (counted on diagnostics; see lira keys show)"
 
 
 class LinkWatch:
@@ -42,6 +44,7 @@ class Reporter:
         self._watch = LinkWatch()
         self._publisher = bus.publisher(DIAGNOSTICS)
         self._said = ""
+        self._strangers = False
 
     def run(self, stop: threading.Event) -> None:
         """Report until `stop` is set."""
@@ -50,8 +53,16 @@ class Reporter:
             if trouble and trouble != self._said:
                 print(f"{self._bus.robot}: {trouble}", file=sys.stderr, flush=True)
             self._said = trouble
+            self._tell_of_strangers()
             now_s = self._robot.now()
             self._publisher.put(DiagnosticArray(now_s, (self._governor(), self._link(trouble))), now_s)
+
+    def _tell_of_strangers(self) -> None:
+        """Say so when the first link is refused: it may well be the owner's, with keys that have expired."""
+        strangers = self._bus.refusals.counts[LINK] > 0
+        if strangers and not self._strangers:
+            print(f"{self._bus.robot}: {STRANGER}", file=sys.stderr, flush=True)
+        self._strangers = strangers
 
     def _governor(self) -> DiagnosticStatus:
         state = self._robot.state
@@ -65,6 +76,7 @@ class Reporter:
             ("links", str(self._bus.links())),
             ("peers", str(self._bus.peers())),
             ("encrypted", str(self._bus.encrypted).lower()),
+            *((f"refused {kind}", str(count)) for kind, count in self._bus.refusals.counts.items()),
         )
         return DiagnosticStatus(
             WARN if trouble else OK, f"{self._bus.robot}: link", trouble or "two links each", values

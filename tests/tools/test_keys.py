@@ -18,10 +18,10 @@ from hal.null import NullRobot
 from hal.profile import load_profile
 from hal.remote import RemoteRobot
 from hal.server import HalServer
-from hal.topics import APPLIED, CMD_VEL
+from hal.topics import APPLIED, CMD_VEL, DIAGNOSTICS, SIM_STATE
 from tools.authority import enroll, init
 from tools.cli import main
-from tools.processes import free_port
+from tools.processes import ChildProcess, free_port, lira_command
 
 GO = Twist(0.5, 0.0)
 NAME = "keyed"
@@ -56,6 +56,13 @@ def drive_until(client, twist, wanted):
     deadline_s = time.monotonic() + 5.0
     while not wanted(client.drive(Command(twist, client.now()))):
         assert time.monotonic() < deadline_s
+
+
+def wait_for(condition, timeout_s):
+    deadline_s = time.monotonic() + timeout_s
+    while not condition():
+        assert time.monotonic() < deadline_s, "never happened"
+        time.sleep(0.02)
 
 
 @pytest.mark.parametrize("who", ["laptop", "anna"])
@@ -119,6 +126,38 @@ def test_a_plain_zenoh_put_without_a_certificate_moves_nothing(robot):
     assert inner.state().x_m == 0.0
     # It takes its time while it tries to connect.
     threading.Thread(target=session.close, daemon=True).start()
+
+
+def test_who_is_kept_out_of_a_served_twin_is_counted(folder, tmp_path, monkeypatch):
+    endpoint = f"127.0.0.1:{free_port()}"
+    monkeypatch.setenv("LIRA_KEYS", str(folder / "robot"))
+    command = lira_command("twin", "--name", NAME, "--listen", endpoint, "--renderer", "tiny")
+    with ChildProcess("twin", command, tmp_path / "twin.log") as twin:
+        assert "encrypted" in twin.wait_ready("serves", 40.0)
+        bus = Bus(NAME, connect=endpoint, keys=load_keys(folder / "laptop"))
+        viewer = Bus(NAME, connect=endpoint, keys=load_keys(folder / "guest"))
+        diagnostics, state = bus.reader(DIAGNOSTICS), bus.reader(SIM_STATE)
+
+        def refused(kind):
+            newest = diagnostics.newest()
+            link = None if newest is None else next(s for s in newest.message.status if s.name.endswith("link"))
+            return -1 if link is None else int(dict(link.values)[f"refused {kind}"])
+
+        wait_for(lambda: refused("links") == refused("messages") == 0 and state.newest() is not None, 10.0)
+        began_m = state.newest().message.x_m
+        plain = plain_session(endpoint)
+        forger = viewer.publisher(CMD_VEL)
+        wait_for(lambda: forger.matching, 5.0)
+        for step in range(40):
+            for put in (lambda t: plain.put(f"{NAME}/cmd_vel", encode(t)), lambda t: forger.put(t, 0.0)):
+                put(STOP if step < 20 else GO)
+            time.sleep(0.02)
+        wait_for(lambda: refused("links") >= 1 and refused("messages") == 40, 10.0)
+        assert state.newest().message.x_m == began_m
+        assert twin.output().count("without a valid certificate") == 1
+        threading.Thread(target=plain.close, daemon=True).start()
+        assert viewer.close()
+        assert bus.close()
 
 
 def test_a_certificate_of_another_authority_is_refused(folder, robot):

@@ -68,11 +68,12 @@ def run(args: argparse.Namespace) -> int:
 
     from hal.bus import Bus
     from hal.governed import GovernedRobot
+    from hal.refusals import count_refusals
     from hal.server import HalServer, stop_on_signal
     from robot.rosbot import Devices, Rosbot
 
     robot = Rosbot(profile, Devices(args.base, args.lidar, args.camera, args.openni, settings))
-    bus = Bus(args.name, listen=args.listen, insecure=args.insecure)
+    bus = Bus(args.name, listen=args.listen, insecure=args.insecure, refusals=count_refusals())
     try:
         with stop_on_signal() as stop:
 

@@ -77,13 +77,14 @@ def run(args: argparse.Namespace) -> int:
 
     from hal.bus import Bus
     from hal.governed import GovernedRobot
+    from hal.refusals import count_refusals
     from hal.server import HalServer, stop_on_signal
     from sim_backend.twin import Twin
 
     factor = None if args.lockstep else args.speed
     twin = Twin(profile, world, layout=args.layout, seed=args.seed, realtime_factor=factor, renderer=args.renderer)
     pace = "lockstep" if args.lockstep else "real time" if factor == 1.0 else f"{factor:g} times real time"
-    bus = Bus(args.name, listen=args.listen, insecure=args.insecure)
+    bus = Bus(args.name, listen=args.listen, insecure=args.insecure, refusals=count_refusals())
     try:
         with stop_on_signal() as stop:
 
