@@ -135,6 +135,38 @@ class DiagnosticArray:
     status: tuple[DiagnosticStatus, ...]
 
 
+class Request(StrEnum):
+    """What a person can ask of whoever drives and learns."""
+
+    PAUSE = "pause"  # the robot stands and nothing is learned
+    RESUME = "resume"
+    RESET = "reset"  # a new episode; on a twin from the start
+    SAVE = "save"  # all that was learned, to disk, now
+    WHEEL = "wheel"  # to the expert that is named
+
+
+@dataclass(frozen=True, slots=True)
+class OperatorRequest:
+    """A person's request (`operator`). `name` is the expert that shall drive, empty for the other requests."""
+
+    request: Request
+    name: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class OperatorAnswer:
+    """What became of the newest request, and whether driving and learning are paused (`operator/answer`).
+
+    `count` requests have been answered; before the first `words` is empty.
+    """
+
+    stamp_s: float
+    paused: bool = False
+    count: int = 0
+    accepted: bool = True
+    words: str = ""
+
+
 @dataclass(frozen=True, slots=True)
 class LaserScan:
     """sensor_msgs/LaserScan. `ranges`: float32 [n], counter-clockwise from `angle_min`, metres, REP-117."""

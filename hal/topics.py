@@ -23,6 +23,8 @@ from hal.messages import (
     JoyFeedback,
     LaserScan,
     Odometry,
+    OperatorAnswer,
+    OperatorRequest,
     Range,
     Twist,
 )
@@ -83,6 +85,8 @@ APPLIED = Topic("cmd_vel/applied", Applied, 20.0, 0.3, URGENT)
 ESTOP = Topic("estop", Bool, 1.0, float("inf"), LATCHED)  # true presses; only a query releases
 JOY = Topic("joy", Joy, 30.0, 0.2, SENSOR)
 JOY_FEEDBACK = Topic("joy/feedback", JoyFeedback, 10.0, 0.2, REPORT)
+OPERATOR = Topic("operator", OperatorRequest, 5.0, 1.0, REPORT)  # asked later than this counts for nothing
+OPERATOR_ANSWER = Topic("operator/answer", OperatorAnswer, 1.0, 3.0, REPORT)
 DECISION = Topic("lira/decision", Decision, 5.0, 1.0, REPORT)
 DIAGNOSTICS = Topic("diagnostics", DiagnosticArray, 1.0, 3.0, REPORT)
 SIM_STATE = Topic("sim/state", CourseState, 20.0, 0.3, SENSOR)
@@ -101,6 +105,8 @@ TOPICS: tuple[Topic[Any], ...] = (
     ESTOP,
     JOY,
     JOY_FEEDBACK,
+    OPERATOR,
+    OPERATOR_ANSWER,
     DECISION,
     DIAGNOSTICS,
     SIM_STATE,

@@ -4,7 +4,17 @@ from typing import Any
 
 import numpy as np
 
-from hal.messages import Bool, Clock, DiagnosticArray, DiagnosticStatus, Joy, JoyFeedback
+from hal.messages import (
+    Bool,
+    Clock,
+    DiagnosticArray,
+    DiagnosticStatus,
+    Joy,
+    JoyFeedback,
+    OperatorAnswer,
+    OperatorRequest,
+    Request,
+)
 from hal.ros.types import Codec, header, ros, seconds, stamp, time_to
 
 
@@ -60,10 +70,29 @@ def _feedback_from(message: Any) -> JoyFeedback:
     return JoyFeedback(message.type, message.id, message.intensity)
 
 
+def _request_to(m: OperatorRequest) -> Any:
+    return ros("lira_msgs/msg/OperatorRequest")(m.request.value, m.name)
+
+
+def _request_from(message: Any) -> OperatorRequest:
+    return OperatorRequest(Request(message.request), message.name)
+
+
+def _answer_to(m: OperatorAnswer) -> Any:
+    head = header(m.stamp_s, "")
+    return ros("lira_msgs/msg/OperatorAnswer")(head, m.paused, m.count, m.accepted, m.words)
+
+
+def _answer_from(message: Any) -> OperatorAnswer:
+    return OperatorAnswer(stamp(message), bool(message.paused), message.count, bool(message.accepted), message.words)
+
+
 CODECS: dict[type, Codec] = {
     Clock: Codec("rosgraph_msgs/msg/Clock", _clock_to, _clock_from),
     DiagnosticArray: Codec("diagnostic_msgs/msg/DiagnosticArray", _diagnostics_to, _diagnostics_from),
     Bool: Codec("std_msgs/msg/Bool", _bool_to, _bool_from),
     Joy: Codec("sensor_msgs/msg/Joy", _joy_to, _joy_from),
     JoyFeedback: Codec("sensor_msgs/msg/JoyFeedback", _feedback_to, _feedback_from),
+    OperatorRequest: Codec("lira_msgs/msg/OperatorRequest", _request_to, _request_from),
+    OperatorAnswer: Codec("lira_msgs/msg/OperatorAnswer", _answer_to, _answer_from),
 }
