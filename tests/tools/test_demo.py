@@ -105,3 +105,15 @@ except KeyboardInterrupt:
     for pid in map(int, pids.read_text().split()):
         with pytest.raises(ProcessLookupError):
             os.kill(pid, 0)
+
+
+def test_missing_experts_are_named_before_anything_starts(tmp_path):
+    code = "import sys; sys.modules.update(dict.fromkeys(['torch', 'pybullet', 'zenoh', 'safetensors']))\n"
+    code += f"from tools.cli import main; sys.exit(main(['demo', '--profile', 'rosbot2', '--run', {str(tmp_path / 'r')!r}]))"
+    done = subprocess.run(python(code), check=False, capture_output=True, text=True, timeout=30)
+    assert done.returncode == 2
+    assert done.stderr.splitlines() == [
+        "lira demo: no camera expert comes with the profile 'rosbot2'",
+        "  Train one with: lira train-expert camera --profile rosbot2",
+    ]
+    assert not (tmp_path / "r").exists()

@@ -14,7 +14,7 @@ import torch
 
 from fusion.checkpoint import Checkpoint, save_checkpoint
 from fusion.demonstrations import Demonstration, DemonstrationLog
-from fusion.experts import shipped_path
+from fusion.expert_files import shipped_path
 from fusion.networks import LidarNet
 from hal import remote
 from hal.bus import Bus

@@ -48,13 +48,16 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Run the demo from start to report."""
+    from fusion.expert_files import SHIPPED, expert_path
     from hal.profile import load_profile
     from sim_backend.catalogue import load_world
     from tools.processes import free_port, lira_command
 
     # What cannot work is refused before anything starts.
-    load_profile(args.profile)
+    profile = load_profile(args.profile)
     load_world(args.world)
+    for expert in SHIPPED:
+        expert_path(expert, profile)
     for package, extra in NEEDED.items():
         if find_spec(package) is None:
             raise MissingExtraError(package, extra)

@@ -26,7 +26,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Train, measure the cruise action, save. Exit status 1 if the expert did not pass its curriculum."""
-    from fusion.experts import shipped_path
+    from fusion.expert_files import shipped_path
     from hal.profile import load_profile
     from tools.training import train_expert
 
