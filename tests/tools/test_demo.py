@@ -5,6 +5,7 @@ import signal
 import subprocess
 import sys
 import time
+from importlib import resources
 from pathlib import Path
 
 import pytest
@@ -108,12 +109,13 @@ except KeyboardInterrupt:
 
 
 def test_missing_experts_are_named_before_anything_starts(tmp_path):
+    profile = tmp_path / "mine.toml"
+    like = resources.files("hal") / "profiles" / "thesis-sim.toml"
+    profile.write_text(like.read_text(encoding="utf-8").replace('"thesis-sim"', '"mine"'))
+    words = ["demo", "--profile", str(profile), "--run", str(tmp_path / "run")]
     code = "import sys; sys.modules.update(dict.fromkeys(['torch', 'pybullet', 'zenoh', 'safetensors']))\n"
-    code += f"from tools.cli import main; sys.exit(main(['demo', '--profile', 'rosbot2', '--run', {str(tmp_path / 'r')!r}]))"
+    code += f"from tools.cli import main; sys.exit(main({words!r}))"
     done = subprocess.run(python(code), check=False, capture_output=True, text=True, timeout=30)
     assert done.returncode == 2
-    assert done.stderr.splitlines() == [
-        "lira demo: no camera expert comes with the profile 'rosbot2'",
-        "  Train one with: lira train-expert camera --profile rosbot2",
-    ]
-    assert not (tmp_path / "r").exists()
+    assert done.stderr.splitlines()[0] == "lira demo: no camera expert comes with the profile 'mine'"
+    assert not (tmp_path / "run").exists()
