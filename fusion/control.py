@@ -76,9 +76,7 @@ class ControlLoop:
         observation = self._robot.read()
         features = self._features(observation)
         if features is None:
-            if self._reason not in HELD:
-                self._command(STAND, observation.seq)
-            self._keep_time()
+            self._stand(observation)
             return None
         proposal = method.propose(features)
         state = None if self._truth is None else self._truth()
@@ -88,6 +86,15 @@ class ControlLoop:
         lesson = self._learn(method, proposal, applied)
         self._keep_time()
         return Step(observation, proposal, applied, lesson, state)
+
+    def stand(self) -> None:
+        """Let one period pass without a decision: the robot stands, unless a hand drives it."""
+        self._stand(self._robot.read())
+
+    def _stand(self, observation: Observation) -> None:
+        if self._reason not in HELD:
+            self._command(STAND, observation.seq)
+        self._keep_time()
 
     def _features(self, observation: Observation) -> Features | None:
         try:

@@ -137,6 +137,13 @@ class DemonstrationLog:
         self._drain()
         self._check_space()
 
+    def sync(self) -> None:
+        """Wait until every label is on the disk itself. May be called from any thread. Raises `StorageError`."""
+        try:
+            os.fsync(self._file)
+        except OSError as error:
+            raise self._failed(error) from error
+
     def close(self) -> None:
         """Write what is left, sync and unlock. Raises `StorageError` if labels could not be written."""
         if self._file < 0:

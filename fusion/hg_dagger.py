@@ -27,9 +27,11 @@ class HgDagger:
         return Proposal(features, Choice("novice", a_n), a_n)
 
     def learn(self, proposal: Proposal, human: Action | None) -> Lesson:
-        """Store the human's action."""
+        """Store the human's action, unless it is an idle frame that is to be left out."""
         if human is None:
             return Lesson(proposal.choice)
+        if self.novice.leaves_out(human):
+            return Lesson(Choice("human", human))
         stored = self.novice.learn(proposal.features, human, "human", proposal.novice)
         return Lesson(Choice("human", human, label=human), stored)
 

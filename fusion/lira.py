@@ -9,6 +9,7 @@ unreachable; the text says "a single expert", and so does `choose`.
 
 from collections import deque
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Literal
 
 import numpy as np
@@ -106,6 +107,8 @@ class LiraSpf:
         choice = proposal.choice
         if human is not None:
             choice = choose(human, proposal.experts, proposal.novice, self._consensus)
+            if self.novice.leaves_out(human):
+                choice = replace(choice, label=None)
         if choice.label is None:
             return Lesson(choice)
         return Lesson(choice, self.novice.learn(proposal.features, choice.label, choice.driver, proposal.novice))

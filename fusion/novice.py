@@ -1,6 +1,6 @@
 """The novice Pi^N and its labels D^N: it acts, drops redundant labels, and trains whenever m new ones are stored."""
 
-from typing import Protocol
+from typing import Literal, Protocol
 
 from fusion.learner import Label, Weights
 from fusion.networks import Network
@@ -8,14 +8,21 @@ from fusion.preprocess import Features
 from hal.config import Table
 from hal.messages import Action
 
+REST = 1e-6  # an action within this of zero is none
+
 
 class LearningSettings(Table, frozen=True):
-    """How labels become a policy; fractions are of the action range."""
+    """How labels become a policy; fractions are of the action range.
+
+    An *idle frame* is a step with the dead-man held and the stick at rest. As a label it teaches to stand, which is
+    what was done; a person who only thinks for a moment may rather want it left out.
+    """
 
     labels_per_step: int = 30  # m
     redundancy: float = 0.05  # L
     action_range: float = 2.0
     filter_human: bool = True  # False keeps every human label
+    idle_frames: Literal["label", "skip"] = "label"
 
 
 class Trainer(Protocol):
@@ -71,6 +78,10 @@ class Novice:
             return False
         self.remember(Label(features.scan, features.image, action, source))
         return True
+
+    def leaves_out(self, human: Action) -> bool:
+        """Whether the human's action is an idle frame that is to be no label."""
+        return self.settings.idle_frames == "skip" and max(map(abs, human)) <= REST
 
     def remember(self, label: Label) -> None:
         """Take in a label that an earlier session stored."""

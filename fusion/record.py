@@ -100,6 +100,7 @@ class RunRecord(msgspec.Struct, frozen=True, tag="run"):
     seed: int
     command: str
     version: str
+    idle_frames: str = "label"  # as in `LearningSettings`
 
 
 class ResultRecord(msgspec.Struct, frozen=True, tag="result"):

@@ -1,0 +1,51 @@
+"""The dead-man is held and the stick rests: a label or none, as the settings say, in the same way for every method."""
+
+import numpy as np
+import pytest
+
+from fusion.hg_dagger import HgDagger
+from fusion.lira import PRESETS, LiraSpf
+from fusion.method import Expert
+from fusion.networks import CameraNet
+from fusion.novice import LearningSettings, Novice
+from fusion.preprocess import Features
+
+FEATURES = Features(np.zeros(101, np.float32), np.zeros((32, 32), np.float32))
+REST, CREEP = (0.0, 0.0), (0.0, 0.01)
+
+
+class Collector:
+    """A trainer that only takes labels."""
+
+    pending = False
+
+    def __init__(self):
+        self.actions = []
+
+    def add(self, label):
+        self.actions.append(label.action)
+
+    def poll(self, now_s):
+        return None
+
+
+def make_lira(novice):
+    experts = [Expert(name, lambda _: (1.0, 0.0)) for name in ("camera", "lidar")]
+    return LiraSpf(experts, novice, PRESETS["hold"], period_s=0.2)
+
+
+@pytest.mark.parametrize("make", [make_lira, HgDagger], ids=["lira", "hg-dagger"])
+@pytest.mark.parametrize(("settings", "kept"), [({}, [REST, CREEP]), ({"idle_frames": "skip"}, [CREEP])])
+def test_an_idle_frame_is_a_label_unless_the_settings_skip_it(make, settings, kept):
+    collector = Collector()
+    method = make(Novice(CameraNet(16), collector, LearningSettings(filter_human=False, **settings)))
+    lessons = [method.learn(method.propose(FEATURES), action) for action in (REST, CREEP)]
+    assert collector.actions == kept
+    assert [lesson.choice.label for lesson in lessons if lesson.stored] == kept
+    assert [(lesson.choice.driver, lesson.choice.action) for lesson in lessons] == [("human", REST), ("human", CREEP)]
+
+
+@pytest.mark.parametrize("make", [make_lira, HgDagger], ids=["lira", "hg-dagger"])
+def test_a_frame_that_is_left_out_is_not_given_either(make):
+    method = make(Novice(CameraNet(16), Collector(), LearningSettings(idle_frames="skip")))
+    assert method.learn(method.propose(FEATURES), REST).choice.label is None
