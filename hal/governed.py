@@ -6,7 +6,7 @@ from dataclasses import replace
 from hal.field import measure_clearance
 from hal.governor import Governor, State
 from hal.messages import Applied, Command, LaserScan, Observation, Reason
-from hal.port import MotorSwitch, Robot
+from hal.port import Herald, MotorSwitch, Robot
 from hal.profile import RobotProfile
 
 SLICE_S = 0.05  # the watchdog looks at least this often while the robot's time passes in `wait`
@@ -85,8 +85,11 @@ class GovernedRobot:
             self._robot.wait(until_s if until_s - now_s < SLICE_S + ROUNDING_S else now_s + SLICE_S)
 
     def pass_time(self, until_s: float) -> None:
-        """As `wait`, for a server that has its watchdog on another thread."""
-        self._robot.wait(until_s)
+        """As `wait`, for a server that has its watchdog on another thread; not as long if there is something new."""
+        if isinstance(self._robot, Herald):
+            self._robot.wait_news(until_s)
+        else:
+            self._robot.wait(until_s)
 
     def halt(self) -> Applied:
         """Stop now, forget every command."""

@@ -44,6 +44,14 @@ class MotorSwitch(Protocol):
         """Cut the power, or give it back. Returns at once; may be called from any thread."""
 
 
+@runtime_checkable
+class Herald(Protocol):
+    """What a robot may have beside the port: it says when a sensor has something new."""
+
+    def wait_news(self, until_s: float) -> None:
+        """Let the robot's time pass until there is something new to `read`, and until `until_s` at most."""
+
+
 class Arena(Protocol):
     """What a twin can do and a floor cannot: start afresh, and tell where the robot really is."""
 

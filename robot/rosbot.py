@@ -36,7 +36,7 @@ class Devices:
 
 
 class Rosbot:
-    """Implements `hal.port.Robot` and `MotorSwitch`. Its clock is the monotonic clock.
+    """Implements `hal.port.Robot`, `MotorSwitch` and `Herald`. Its clock is the monotonic clock.
 
     A device that is lost is opened again by itself; meanwhile, and until the first zero command afterwards, the wheels
     stand, and `Applied.clamps` says why: "no_lidar", "no_camera", "no_base", "neutral_first".
@@ -48,6 +48,7 @@ class Rosbot:
         self._scan: LaserScan | None = None
         self._picture: Picture | None = None
         self._newest: Observation | None = None
+        self._news = threading.Event()  # a scan or a picture; the base is read often enough
         self._armed = False
         self._open = False
         self.base = Core2(devices.base, devices.settings.base, profile.control.robot_timeout_s)
@@ -127,6 +128,11 @@ class Rosbot:
         """Sleep."""
         time.sleep(max(until_s - time.monotonic(), 0.0))
 
+    def wait_news(self, until_s: float) -> None:
+        """Sleep until there is a new scan or picture."""
+        if self._news.wait(max(until_s - time.monotonic(), 0.0)):
+            self._news.clear()
+
     def close(self) -> None:
         """Stop the wheels, then the lidar, and let go of all. May be called twice."""
         self._open = False
@@ -158,9 +164,11 @@ class Rosbot:
 
     def _see_scan(self, scan: LaserScan) -> None:
         self._scan = scan
+        self._news.set()
 
     def _see_picture(self, picture: Picture) -> None:
         self._picture = picture
+        self._news.set()
 
 
 def fresh_of(value: S | None, topic: Topic[Any], now_s: float) -> S | None:

@@ -3,7 +3,7 @@
 import contextlib
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -51,14 +51,22 @@ class Mode:
 class RPLidar:
     """Reads turns from a unit at `url` (a serial port, or `socket://host:port`) and hands each scan to `put`.
 
-    `session` is for a `Keeper`.
+    `session` is for a `Keeper`. `parsers` read the streams that are understood, the best first.
     """
 
-    def __init__(self, url: str, lidar: Lidar, settings: LidarSettings, put: Callable[[LaserScan], None]) -> None:
+    def __init__(
+        self,
+        url: str,
+        lidar: Lidar,
+        settings: LidarSettings,
+        put: Callable[[LaserScan], None],
+        parsers: Mapping[Answer, Parser] = PARSERS,
+    ) -> None:
         self._url = url
         self._lidar = lidar
         self._settings = settings
         self._put = put
+        self._parsers = parsers
         self.counts = Counts()
         self.info: Info | None = None
         self.mode: Mode | None = None
@@ -80,7 +88,7 @@ class RPLidar:
 
     def _read(self, line: Line, mode: Mode, rest: bytes, stop: threading.Event, begin: Callable[[], None]) -> None:
         mounting = Mounting(self._settings.yaw_offset_rad, self._settings.mirror)
-        stream = Stream(PARSERS[mode.answer], mode.sample_s, TurnCutter(mounting), self._lidar, self.counts)
+        stream = Stream(self._parsers[mode.answer], mode.sample_s, TurnCutter(mounting), self._lidar, self.counts)
         heard_s = time.monotonic()
         data, begun = rest, False
         while not stop.is_set():

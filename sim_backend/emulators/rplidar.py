@@ -70,6 +70,11 @@ class RplidarUnit:
         """Whether it streams."""
         return self.mode is not None
 
+    @property
+    def progress(self) -> tuple[float, int]:
+        """When the stream began, and how many of its samples were sent (or never will be)."""
+        return self._began_s, self._sent
+
     def receive(self, data: bytes, now_s: float) -> None:
         """Obey whatever complete requests have come."""
         self._request += data

@@ -1,5 +1,10 @@
+import numpy as np
+import pytest
+
+from robot.rplidar.points import NOTHING, Points
 from sim_backend.emulators.rplidar import DENSE_MODE
-from tools.bench import drivers
+from tools.bench import drivers, scan_age
+from tools.bench.devices import COUNT, FIRST_MM, Journal
 
 
 def test_dense_streams_are_parsed_without_loss_for_a_small_share_of_a_core(monkeypatch):
@@ -12,13 +17,47 @@ def test_dense_streams_are_parsed_without_loss_for_a_small_share_of_a_core(monke
     assert row["core_percent"] < 15.0  # 3 on a quiet machine
 
 
-def test_a_live_unit_loses_nothing(monkeypatch):
-    monkeypatch.setattr(drivers, "LIVE_S", 1.5)
-    row = drivers.live_scan()
-    assert row["lost_bytes"] == 0
-    assert row["scans"] >= 8
-    assert row["age_ms_p50"] < 60.0
-
-
 def test_the_base_is_heard_whole():
     assert drivers.parse_base()["per_s"] > 90
+
+
+def test_scans_of_a_robot_in_other_processes_are_timed_from_their_last_sample():
+    row = scan_age.live("dense", 2.0)
+    assert 15 <= row["scans"] <= 25
+    assert row["unit_ms_p50"] > 2.5  # the next packet has to come first
+    assert row["robot_ms_p50"] > 0.0
+    assert row["age_ms_p50"] == pytest.approx(row["unit_ms_p50"] + row["robot_ms_p50"], abs=3.0)
+    assert row["age_ms_p50"] < 60.0  # 6 on a quiet machine
+
+
+def test_a_line_that_is_read_loses_no_sample():
+    row = scan_age.endurance("express", 1.5)
+    assert row["points"] > 4000
+    assert (row["missing"], row["lost_bytes"]) == (0, 0)
+
+
+def test_missing_samples_are_noticed():
+    pieces = [np.arange(0, 5), np.arange(5, 8), NOTHING, np.arange(10, 12), np.arange(0, 3)]
+    metres = iter([(piece + FIRST_MM) / 1000.0 for piece in pieces])
+
+    def parse(buffer):
+        distance_m = next(metres)
+        return Points(distance_m, distance_m)
+
+    checked = scan_age.Checked(parse)
+    seen = []
+    for _ in pieces:
+        checked(b"")
+        seen.append(checked.missing)
+    assert seen == [0, 0, 0, 2, 2 + COUNT - 12]
+
+
+def test_ages_are_reckoned_from_the_units_own_clockwork():
+    # Dense: a turn of 100 ms is 1600 samples; the unit began at a seam, so sample 1600 opens the second turn.
+    began_s = 10.05
+    notes = [(began_s + 0.1 + 0.0025 * (1 + packet), 1600 + 40 * (1 + packet)) for packet in range(4)]
+    row = scan_age.ages([(began_s + 0.103, began_s + 0.1075)], Journal(began_s, notes, 0), "dense")
+    taken_s = began_s + 1599 * 62.5e-6
+    assert row["unit_ms_p50"] == pytest.approx(1e3 * (began_s + 0.105 - taken_s))
+    assert row["robot_ms_p50"] == pytest.approx(2.5)
+    assert row["age_ms_p50"] == pytest.approx(row["unit_ms_p50"] + 2.5)

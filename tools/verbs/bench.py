@@ -5,6 +5,7 @@ examples:
   lira bench twin --json -              one JSON object {name, machine, results} and nothing else on standard output
   lira bench latency --json latency.json
   lira bench soak --minutes 5
+  lira bench drivers --minutes 10       how many samples the lidar's line loses in ten minutes
 """
 
 import argparse
@@ -18,19 +19,23 @@ from typing import TextIO
 from hal.errors import ConfigError, StorageError
 from tools.bench import BENCHES, Row, cell, columns, describe_machine
 
+LASTING = ("soak", "drivers")  # those that go on for --minutes
+
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
     names = "; ".join(f"{name}: {words}" for name, words in BENCHES.items())
     parser.add_argument("name", choices=BENCHES, metavar="NAME", help=names)
-    parser.add_argument("--minutes", type=float, help="how long the soak goes on (default: 30)")
+    parser.add_argument(
+        "--minutes", type=float, help="how long the soak (default: 30) or the line of drivers (0.25) goes on"
+    )
     parser.add_argument("--json", metavar="FILE", help="write a JSON object to FILE (-: standard output)")
 
 
 def run(args: argparse.Namespace) -> int:
     """Run one benchmark and show its rows."""
-    if args.minutes is not None and args.name != "soak":
-        raise ConfigError(f"'{args.name}' takes no --minutes", "Only the soak does: lira bench soak --minutes 5.")
+    if args.minutes is not None and args.name not in LASTING:
+        raise ConfigError(f"'{args.name}' takes no --minutes", f"Only {' and '.join(LASTING)} do.")
     output = take_stdout() if args.json == "-" else sys.stdout
     module = importlib.import_module(f"tools.bench.{args.name}")
     results: list[Row] = module.run(args.minutes) if args.minutes is not None else module.run()
