@@ -1,6 +1,7 @@
 """The fusion service on a robot without an arena: it drives, and learns from whoever takes the wheel.
 
-Nothing here re-arms a robot that stopped by itself: a person does that, with the gamepad or by starting anew.
+Nothing here re-arms a robot that stopped by itself: a person does that, with the gamepad, by a request or by starting
+anew.
 """
 
 from collections.abc import Callable
@@ -9,6 +10,7 @@ from threading import Event
 from fusion.control import ControlLoop
 from fusion.journal import Journal
 from fusion.method import Method
+from fusion.requests import RequestDesk
 from hal.messages import Reason
 
 REARM = "press and release the dead-man, or start anew"
@@ -29,10 +31,21 @@ def serve(
     stop: Event,
     say: Callable[[str], None],
     training_steps: Callable[[], int] = lambda: 0,
+    *,
+    desk: RequestDesk | None = None,
+    layout: int = 0,
 ) -> None:
-    """Run the control loop until `stop` is set. `say` gets a line whenever what holds the robot changes."""
+    """Run the control loop until `stop` is set; `desk` answers what a person asks between two steps.
+
+    `say` gets a line whenever what holds the robot changes.
+    """
     said: Reason | None = Reason.OK
     while not stop.is_set():
+        if desk is not None:
+            desk.serve()
+            if desk.paused:
+                loop.stand()
+                continue
         step = loop.step(method)
         reason = None if step is None else step.applied.reason
         if reason is not said:
@@ -40,4 +53,5 @@ def serve(
             say("driving" if why is None else f"standing still: {why}")
             said = reason
         if step is not None:
-            journal.note(step, phase="train", lap=0, layout=0, training_steps=training_steps())
+            episode = 0 if desk is None else desk.episode
+            journal.note(step, phase="train", lap=episode, layout=layout, training_steps=training_steps())

@@ -1,0 +1,101 @@
+"""Learning from a person, and showing them a policy: they may take the wheel at any time, and ask for things."""
+
+import argparse
+import contextlib
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import msgspec
+
+from fusion.control import ControlLoop
+from fusion.demonstrations import DemonstrationLog, read_demonstrations
+from fusion.experts import load_expert
+from fusion.hg_dagger import HgDagger
+from fusion.journal import Journal
+from fusion.learner import Label
+from fusion.lira import LiraSpf
+from fusion.method import Alone
+from fusion.record import RunWriter
+from fusion.requests import RequestDesk, RequestLine
+from fusion.service import serve
+from hal.bus import Bus
+from hal.messages import Decision, Episode
+from hal.remote import RemoteArena, RemoteRobot
+from hal.server import stop_on_signal
+from sim_backend.world import World
+from tools.run_folder import FLOOR, LABELS, RECORD, head, snapshot
+
+Publish = Callable[[Decision], None]
+Say = Callable[[str], None]
+
+
+def show_policy(args: argparse.Namespace, robot: RemoteRobot, publish: Publish, say: Say) -> int:
+    """Let one policy drive until Ctrl-C."""
+    expert = load_expert(args.policy, robot.profile)
+    method, journal, loop = Alone(expert.name, expert.act), Journal(publish=publish), ControlLoop(robot)
+    with stop_on_signal() as stop, request_line(robot, args) as line:
+        desk = RequestDesk(line, loop, method, journal, say, restart=restarter(robot, args))
+        loop.arm()
+        say(f"'{args.policy}' drives '{args.name}'; stop with Ctrl-C")
+        serve(loop, method, journal, stop, say, desk=desk)
+    return 0
+
+
+def learn_from_person(
+    args: argparse.Namespace, robot: RemoteRobot, make: Callable[[], LiraSpf | HgDagger], publish: Publish, say: Say
+) -> int:
+    """Learn from whoever takes the wheel with the dead-man, until Ctrl-C; then save the novice."""
+    profile = robot.profile
+    folder: Path = args.run or Path("runs") / args.method
+    # The log goes first: if it is damaged, nothing else is touched.
+    with DemonstrationLog(folder / LABELS, profile) as log, RunWriter(folder / RECORD) as record:
+        method = make()
+        novice = method.novice
+        try:
+            record.write(head(args, profile, world_of(robot)))
+            for old in read_demonstrations(folder / LABELS):
+                if old.stored:
+                    novice.remember(Label(old.scan, old.image, old.action, old.source))
+            journal, loop = Journal(keep=log.append, write=record.write, publish=publish), ControlLoop(robot)
+            with stop_on_signal() as stop, request_line(robot, args) as line:
+                desk = RequestDesk(
+                    line,
+                    loop,
+                    method,
+                    journal,
+                    say,
+                    restart=restarter(robot, args),
+                    snapshot=lambda: snapshot(folder, novice, profile, args, log.sync),
+                )
+                loop.arm()
+                say(f"{args.method} learns on '{args.name}' with {novice.stored} labels; hold the dead-man to drive")
+                with contextlib.closing(desk):
+                    serve(
+                        loop, method, journal, stop, say, lambda: novice.training_steps, desk=desk, layout=args.layout
+                    )
+        finally:
+            novice.close()
+    say(snapshot(folder, novice, profile, args)())
+    return 0
+
+
+@contextlib.contextmanager
+def request_line(robot: RemoteRobot, args: argparse.Namespace) -> Iterator[RequestLine]:
+    """Listen to what a person asks."""
+    watch = Bus(args.name, connect=args.connect, watch=True)
+    try:
+        yield RequestLine(robot.bus, watch, robot.now)
+    finally:
+        watch.close()
+
+
+def restarter(robot: RemoteRobot, args: argparse.Namespace) -> Callable[[], None] | None:
+    """Return what puts a twin's robot back to the start; None for a real robot."""
+    arena = RemoteArena(robot)
+    return None if world_of(robot) == FLOOR else lambda: arena.reset(Episode(args.layout))
+
+
+def world_of(robot: RemoteRobot) -> str:
+    """Return the name of a twin's world; `FLOOR` for a real robot."""
+    world = msgspec.json.decode(robot.info.arena, type=World | None)
+    return FLOOR if world is None else world.name

@@ -1,0 +1,56 @@
+"""What a learning run leaves in its folder: every label, the record of its steps, and the novice."""
+
+import argparse
+import copy
+import shlex
+import sys
+from collections.abc import Callable
+from pathlib import Path
+
+from fusion.checkpoint import Checkpoint, save_checkpoint
+from fusion.novice import Novice
+from fusion.record import RunRecord
+from fusion.requests import Job
+from hal.profile import RobotProfile
+from tools.cli import version
+
+LABELS, RECORD, NOVICE = "labels.lira", "run.jsonl", "novice.safetensors"
+FLOOR = "floor"  # the world of a robot that is in none of ours
+
+
+def head(args: argparse.Namespace, profile: RobotProfile, world: str) -> RunRecord:
+    """How the run was started, from the arguments of `lira fusion`."""
+    preset = args.preset if args.method == "lira" else ""
+    return RunRecord(
+        world, profile.name, args.method, preset, args.layout, args.seed, command(args), version(), args.idle_frames
+    )
+
+
+def snapshot(
+    folder: Path,
+    novice: Novice,
+    profile: RobotProfile,
+    args: argparse.Namespace,
+    sync: Callable[[], None] = lambda: None,
+) -> Job:
+    """Take what was learned as it is now; what is returned writes it, may run aside, and says what it wrote.
+
+    `sync` makes sure of the labels. The writing raises `StorageError`.
+    """
+    labels, steps, network = novice.stored, novice.training_steps, copy.deepcopy(novice.network)
+    sizes = profile.features.bins, profile.features.filters
+    about = Checkpoint("fusion", *sizes, profile.name, None, command(args), args.seed)
+
+    def write() -> str:
+        sync()
+        if steps == 0:
+            return f"saved {labels} labels in {folder}; there is no novice yet"
+        save_checkpoint(folder / NOVICE, network, about)
+        return f"saved {labels} labels and the novice after {steps} training steps in {folder}"
+
+    return write
+
+
+def command(args: argparse.Namespace) -> str:
+    """Return the command that repeats the run."""
+    return str(args.as_command or shlex.join(["lira", *sys.argv[1:]]))
