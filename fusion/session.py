@@ -6,7 +6,7 @@ from typing import Literal, Protocol
 
 import numpy as np
 
-from fusion.control import ControlLoop, Step, Teacher
+from fusion.control import HELD, ControlLoop, Step, Teacher
 from fusion.journal import Journal
 from fusion.method import Alone, Method
 from fusion.novice import Novice
@@ -178,8 +178,11 @@ class Session:
     def _step(self, method: Method, teacher: Teacher | None) -> Step:
         for _ in range(LOST_OBSERVATIONS):
             step = self._loop.step(method, teacher)
-            if step is not None:
-                return step
+            if step is None:
+                continue
+            if step.applied.reason in HELD:  # a busy machine was silent for too long; nobody else is here to arm it
+                self._loop.arm()
+            return step
         raise DeviceError(
             f"{LOST_OBSERVATIONS} observations in a row could not be used; the last: {self._loop.trouble}",
             "Check the lidar and the camera.",

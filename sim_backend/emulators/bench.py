@@ -21,6 +21,7 @@ LOOK_S = 0.01
 OPEN_S = 30.0
 RESET_S = 0.25  # two turns of the lidar and a bit
 JOIN_S = 5.0
+REACH_M = 12.0  # of an A2M8; a profile that sees less far is served as in a hall with walls at this distance
 QUALITY = 95
 
 
@@ -107,7 +108,10 @@ class WiredTwin:
         self.twin.drive(Command(twist, self.twin.now()))
 
     def _distances(self, theta_rad: Floats) -> Floats:
-        """What the laser meets at the unit's clockwise angles; 0 where nothing comes back."""
+        """What the laser meets at the unit's clockwise angles; 0 where nothing comes back.
+
+        Zero says nothing to a driver, so a unit in the open would be as good as blind.
+        """
         scan = self._scan
         if scan is None:
             return np.zeros(len(theta_rad))
@@ -118,6 +122,8 @@ class WiredTwin:
             index %= beams
         seen = (index >= 0) & (index < beams)
         ranges = np.where(seen, scan.ranges[np.clip(index, 0, beams - 1)], np.nan)
+        if scan.range_max < REACH_M:
+            ranges = np.where(np.isposinf(ranges), REACH_M, ranges)
         return np.where(np.isfinite(ranges), ranges, 0.0)
 
 

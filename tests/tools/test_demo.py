@@ -5,6 +5,7 @@ import signal
 import subprocess
 import sys
 import time
+from dataclasses import replace
 from importlib import resources
 from pathlib import Path
 
@@ -13,6 +14,7 @@ from synthetic_run import write_run
 
 from hal.errors import ConfigError
 from tools.processes import ProcessError
+from tools.rig import Part
 from tools.verbs import demo
 
 HERE = Path(__file__).parent
@@ -21,6 +23,15 @@ TWIN = "import time; print(\"twin 'x' serves world 'line'\", flush=True); time.s
 
 def python(code):
     return [sys.executable, "-c", code]
+
+
+def parts(*codes):
+    """Stand-ins for the processes of a robot."""
+    names = ("the twin", "the robot")
+    return [
+        Part(name, f"{name.split()[1]}.log", "serves world", lambda _, code=code: python(code))
+        for name, code in zip(names, codes, strict=False)
+    ]
 
 
 def learner(folder, *, converged=True):
@@ -44,7 +55,7 @@ def _keep_signals():
 
 
 def test_a_run_that_converges_exits_0_with_its_report(tmp_path, capsys):
-    assert demo.supervise(python(TWIN), learner(tmp_path), tmp_path) == 0
+    assert demo.supervise(parts(TWIN), learner(tmp_path), tmp_path) == 0
     out = capsys.readouterr().out
     assert out.startswith("twin 'x' serves world")
     assert "alone on unseen layouts: 1 of 1 passed, 0 collisions" in out
@@ -53,33 +64,42 @@ def test_a_run_that_converges_exits_0_with_its_report(tmp_path, capsys):
 
 
 def test_a_run_that_does_not_converge_exits_1_and_still_reports(tmp_path, capsys):
-    assert demo.supervise(python(TWIN), learner(tmp_path, converged=False), tmp_path) == 1
+    assert demo.supervise(parts(TWIN), learner(tmp_path, converged=False), tmp_path) == 1
     assert "did not pass its proving run" in capsys.readouterr().out
     assert (tmp_path / "report.html").exists()
 
 
 def test_a_twin_that_dies_is_named_and_quoted(tmp_path):
-    twin = python("import time; print('serves world', flush=True); time.sleep(0.3); raise SystemExit('no floor')")
+    twin = parts("import time; print('serves world', flush=True); time.sleep(0.3); raise SystemExit('no floor')")
     with pytest.raises(ProcessError, match=r"(?s)the twin ended with status 1.*no floor") as error:
         demo.supervise(twin, python("import time; time.sleep(60)"), tmp_path)
     assert str(tmp_path / "twin.log") in error.value.remedy
 
 
+def test_a_robot_in_front_of_the_twin_is_told_what_the_twin_said_and_named_when_it_dies(tmp_path):
+    twin, robot = parts(TWIN, "import time; print('serves world', flush=True); time.sleep(0.3); raise SystemExit(4)")
+    heard = []
+    robot = replace(robot, command=lambda line, command=robot.command: heard.append(line) or command(line))
+    with pytest.raises(ProcessError, match="the robot ended with status 4"):
+        demo.supervise([twin, robot], python("import time; time.sleep(60)"), tmp_path)
+    assert heard == ["twin 'x' serves world 'line'"]
+
+
 def test_a_learner_that_dies_is_named_and_quoted(tmp_path):
     with pytest.raises(ProcessError, match=r"(?s)the learner ended with status 3.*boom"):
-        demo.supervise(python(TWIN), python("print('boom'); raise SystemExit(3)"), tmp_path)
+        demo.supervise(parts(TWIN), python("print('boom'); raise SystemExit(3)"), tmp_path)
 
 
 def test_a_standstill_is_an_error(tmp_path, monkeypatch):
     monkeypatch.setattr(demo, "STALL_S", 0.5)
     with pytest.raises(ProcessError, match="nothing has happened"):
-        demo.supervise(python(TWIN), python("import time; time.sleep(60)"), tmp_path)
+        demo.supervise(parts(TWIN), python("import time; time.sleep(60)"), tmp_path)
 
 
 def test_an_earlier_run_is_not_touched(tmp_path):
     before = write_run(tmp_path, unseen=0).read_bytes()
     with pytest.raises(ConfigError, match="already holds a run"):
-        demo.supervise(python(TWIN), learner(tmp_path), tmp_path)
+        demo.supervise(parts(TWIN), learner(tmp_path), tmp_path)
     assert (tmp_path / "run.jsonl").read_bytes() == before
 
 
@@ -90,9 +110,11 @@ def test_ending_the_demo_ends_its_processes(tmp_path, number):
     child += "print('serves world', flush=True); time.sleep(60)"
     code = f"""
 import pathlib, sys
+from tools.rig import Part
 from tools.verbs.demo import supervise
+command = [sys.executable, "-c", {child!r}]
 try:
-    supervise([sys.executable, "-c", {child!r}], [sys.executable, "-c", {child!r}], pathlib.Path({str(tmp_path)!r}))
+    supervise([Part("the twin", "twin.log", "serves", lambda _: command)], command, pathlib.Path({str(tmp_path)!r}))
 except KeyboardInterrupt:
     sys.exit(130)
 """

@@ -8,6 +8,7 @@ examples:
   lira demo
   lira demo --seed 3 --unseen 5
   lira demo --world race --laps 20 --run runs/race
+  lira demo --wire        the drivers of the real robot in between, byte by byte; in real time
 
 exit status: 0 if the robot learned to drive alone, 1 if it did not within its laps, 2 if something went wrong
 """
@@ -17,6 +18,7 @@ import shlex
 import signal
 import sys
 import time
+from collections.abc import Sequence
 from datetime import datetime
 from importlib.util import find_spec
 from pathlib import Path
@@ -27,9 +29,10 @@ from tools.arguments import natural
 
 if TYPE_CHECKING:
     from tools.processes import ChildProcess
+    from tools.rig import Part
 
 NEEDED = {"pybullet": "sim", "torch": "learn"}  # by the two processes, and the extras that bring them
-READY_S = 60.0
+NEEDED_BY_WIRE = {"serial": "robot"}
 POLL_S = 0.1
 STALL_S = 60.0
 
@@ -42,7 +45,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add("--seed", type=natural, default=0, help="seeds teacher, training and noise (default: %(default)s)")
     add("--layout", type=natural, default=0, help="layout to learn on (default: %(default)s)")
     add("--laps", type=natural, default=12, help="give up after so many training laps (default: %(default)s)")
-    add("--unseen", type=natural, default=3, help="unseen layouts to drive afterwards (default: %(default)s)")
+    add("--unseen", type=natural, help="unseen layouts to drive afterwards (default: 3, with --wire 1)")
+    add(
+        "--wire",
+        action="store_true",
+        help="through the robot's drivers: `lira robot` on emulated devices, in real time",
+    )
     add("--run", type=Path, metavar="DIR", help="folder of the run (default: runs/demo-<date-time>)")
 
 
@@ -52,28 +60,36 @@ def run(args: argparse.Namespace) -> int:
     from hal.profile import load_profile
     from sim_backend.catalogue import load_world
     from tools.processes import free_port, lira_command
+    from tools.rig import direct, wired
 
     # What cannot work is refused before anything starts.
     profile = load_profile(args.profile)
     load_world(args.world)
     for expert in SHIPPED:
         expert_path(expert, profile)
-    for package, extra in NEEDED.items():
+    for package, extra in {**NEEDED, **(NEEDED_BY_WIRE if args.wire else {})}.items():
         if find_spec(package) is None:
             raise MissingExtraError(package, extra)
     folder: Path = args.run or Path("runs") / f"demo-{datetime.now():%Y%m%d-%H%M%S}"
     port = free_port()
     name, endpoint = f"demo_{port}", f"127.0.0.1:{port}"
-    both = ["--name", name, "--layout", str(args.layout), "--seed", str(args.seed)]
-    twin = ["--world", args.world, "--profile", args.profile, "--listen", endpoint, "--lockstep"]
-    fusion = ["--connect", endpoint, "--method", "lira", "--teacher", "scripted", "--run", str(folder)]
-    fusion += ["--train-laps", str(args.laps), "--unseen", str(args.unseen)]
+    both = ["--layout", str(args.layout), "--seed", str(args.seed)]
+    twin = ["--world", args.world, "--profile", args.profile, *both]
+    unseen = args.unseen if args.unseen is not None else 1 if args.wire else 3
+    fusion = [*both, "--name", name, "--connect", endpoint, "--method", "lira", "--teacher", "scripted"]
+    fusion += ["--run", str(folder), "--train-laps", str(args.laps), "--unseen", str(unseen)]
     fusion += ["--as-command", shlex.join(["lira", *sys.argv[1:]])]
-    return supervise(lira_command("twin", *both, *twin), lira_command("fusion", *both, *fusion), folder)
+    if args.wire:
+        arena = f"127.0.0.1:{free_port()}"
+        fusion += ["--arena", arena]
+        parts = wired(name, endpoint, arena, folder / "wire", twin)
+    else:
+        parts = direct(name, endpoint, twin, lockstep=True)
+    return supervise(parts, lira_command("fusion", *fusion), folder)
 
 
-def supervise(twin_command: list[str], fusion_command: list[str], folder: Path) -> int:
-    """Run both processes, show how they get on, stop them, and write the report. Returns the exit status.
+def supervise(parts: Sequence["Part"], fusion_command: list[str], folder: Path) -> int:
+    """Run the robot's parts and the learner, show how they get on, stop them, write the report. Returns the status.
 
     Raises `ProcessError` when one of them dies.
     """
@@ -83,7 +99,7 @@ def supervise(twin_command: list[str], fusion_command: list[str], folder: Path) 
         raise ConfigError(f"{folder} already holds a run", "Choose another folder with --run.")
     signal.signal(signal.SIGTERM, signal.default_int_handler)  # whoever ends the demo ends its processes
     try:
-        watch(twin_command, fusion_command, folder)
+        watch(parts, fusion_command, folder)
     except KeyboardInterrupt:
         if (folder / RECORD).exists():
             print(f"stopped; what was learned so far: lira report {folder}")
@@ -91,18 +107,20 @@ def supervise(twin_command: list[str], fusion_command: list[str], folder: Path) 
     return conclude(folder)
 
 
-def watch(twin_command: list[str], fusion_command: list[str], folder: Path) -> None:
-    """Start the twin, then the learner; return when the learner has ended by itself. Stops the learner first."""
+def watch(parts: Sequence["Part"], fusion_command: list[str], folder: Path) -> None:
+    """Start the robot, then the learner; return when the learner has ended by itself. Stops the learner first."""
     from tools.processes import ChildProcess
+    from tools.rig import running
 
-    with ChildProcess("the twin", twin_command, folder / "twin.log") as twin:
-        print(twin.wait_ready("serves world", READY_S), flush=True)
-        with ChildProcess("the learner", fusion_command, folder / "fusion.log") as learner:
-            follow(twin, learner, folder)
+    with (
+        running(parts, folder, lambda line: print(line, flush=True)) as robot,
+        ChildProcess("the learner", fusion_command, folder / "fusion.log") as learner,
+    ):
+        follow(robot, learner, folder)
 
 
-def follow(twin: "ChildProcess", learner: "ChildProcess", folder: Path) -> None:
-    """Show how the run gets on until the learner ends. Raises `ProcessError` if either dies, or nothing happens."""
+def follow(robot: Sequence["ChildProcess"], learner: "ChildProcess", folder: Path) -> None:
+    """Show how the run gets on until the learner ends. Raises `ProcessError` if anything dies, or nothing happens."""
     from tools.processes import ProcessError
     from tools.progress import Display, Progress, Tail
     from tools.report import RECORD
@@ -118,17 +136,25 @@ def follow(twin: "ChildProcess", learner: "ChildProcess", folder: Path) -> None:
                 if line is not None:
                     display.keep(line)
             display.status(progress.status())
-            if not ended and twin.status() is not None:
-                raise twin.failure()
+            if not ended:
+                raise_dead(robot)
             if time.monotonic() - newest_s > STALL_S:
                 raise ProcessError(
                     f"nothing has happened for {STALL_S:.0f} s; the learner wrote:\n{learner.tail()}",
-                    f"All that both wrote: {learner.log} and {twin.log}",
+                    f"All that was written: {', '.join(str(part.log) for part in [learner, *robot])}",
                 )
     finally:
         display.close()
     if progress.result is None:
-        raise (learner if twin.status() is None else twin).failure()
+        raise_dead(robot)
+        raise learner.failure()
+
+
+def raise_dead(parts: Sequence["ChildProcess"]) -> None:
+    """Raise `ProcessError` for the first part that does not run any more."""
+    for part in parts:
+        if part.status() is not None:
+            raise part.failure()
 
 
 def conclude(folder: Path) -> int:

@@ -13,16 +13,20 @@ examples:
 """
 
 import argparse
+import shlex
 import threading
 import time
+from contextlib import ExitStack
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from hal.errors import ConfigError
 from tools.arguments import natural
 
 if TYPE_CHECKING:
     from hal.bus import Bus
     from hal.profile import RobotProfile
+    from sim_backend.emulators.bench import WiredTwin
     from sim_backend.twin import Twin
     from sim_backend.world import World
 
@@ -55,6 +59,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="be its devices, not a robot on the bus: lidar and base as serial ports in DIR, and a network camera",
     )
     add(
+        "--arena",
+        metavar="HOST:PORT",
+        help="with --wire: where a scripted teacher asks where the robot really is, and has it put back",
+    )
+    add(
         "--renderer",
         choices=("auto", "tiny", "egl"),
         default="auto",
@@ -70,6 +79,8 @@ def run(args: argparse.Namespace) -> int:
     # What is wrong with the words is said at once, before anything heavy is loaded.
     profile, world = load_profile(args.profile), load_world(args.world)
 
+    if args.arena is not None and args.wire is None:
+        raise ConfigError("--arena goes with --wire", "A twin that is a robot on the bus tells the truth there.")
     if args.wire is not None:
         return run_wire(args, profile, world)
 
@@ -110,22 +121,42 @@ def run(args: argparse.Namespace) -> int:
 
 def run_wire(args: argparse.Namespace, profile: "RobotProfile", world: "World") -> int:
     """Be the robot's devices until told to stop."""
+    from hal.bus import Bus
     from hal.server import stop_on_signal
     from sim_backend.emulators.bench import WiredTwin
     from sim_backend.twin import Twin
 
     twin = Twin(profile, world, layout=args.layout, seed=args.seed, realtime_factor=1.0, renderer=args.renderer)
-    with stop_on_signal() as stop:
+    with stop_on_signal() as stop, ExitStack() as held:
+        bus = None
+        if args.arena is not None:
+            bus = Bus(args.name, listen=args.arena, insecure=args.insecure)
+            held.callback(bus.close)
         wired = WiredTwin(twin, args.wire)
         try:
-            words = (
-                f"--lidar {args.wire}/rplidar --base {args.wire}/core2 --camera {wired.url} --profile {args.profile}"
+            words = ["--lidar", f"{args.wire}/rplidar", "--base", f"{args.wire}/core2", "--camera", wired.url]
+            words += ["--profile", args.profile]
+            print(
+                f"world '{world.name}' behind its devices; open them with: lira robot {shlex.join(words)}", flush=True
             )
-            print(f"world '{world.name}' behind its devices; open them with: lira robot {words}", flush=True)
-            stop.wait()
+            if bus is None:
+                stop.wait()
+            else:
+                serve_arena(wired, bus, profile, world, stop)
         finally:
             wired.close()
     return 0
+
+
+def serve_arena(wired: "WiredTwin", bus: "Bus", profile: "RobotProfile", world: "World", stop: threading.Event) -> None:
+    """Tell the truth, and put the robot back when asked, until told to stop."""
+    import msgspec
+
+    from hal.desk import REALTIME, Info
+    from hal.serve_arena import ArenaLoop
+
+    info = Info(profile, REALTIME, bus.epoch, msgspec.Raw(msgspec.json.encode(world)))
+    ArenaLoop(wired, bus, info, wired.twin.now).run(stop)
 
 
 def report(twin: "Twin", bus: "Bus", stop: threading.Event) -> None:

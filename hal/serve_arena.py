@@ -1,0 +1,33 @@
+"""An arena without its robot on the bus: the truth of a twin that is driven through its devices."""
+
+import threading
+from collections.abc import Callable
+
+from hal.bus import Bus
+from hal.desk import Desk, Info
+from hal.port import Arena
+from hal.topics import SIM_STATE
+
+POLL_S = 0.005
+
+
+class ArenaLoop:
+    """Publishes where the robot really is, and puts it down anew when asked. `now` is the arena's clock."""
+
+    def __init__(self, arena: Arena, bus: Bus, info: Info, now: Callable[[], float]) -> None:
+        self._arena = arena
+        self._now = now
+        self._desk = Desk(bus, info, arena, now)
+        self._state = bus.publisher(SIM_STATE)
+
+    def run(self, stop: threading.Event) -> None:
+        """Serve until `stop` is set."""
+        due_s = self._now()
+        while not stop.wait(POLL_S):
+            self._desk.serve(self._show)
+            if self._now() >= due_s:
+                due_s = self._now() + 1.0 / SIM_STATE.rate_hz
+                self._show()
+
+    def _show(self) -> None:
+        self._state.put(self._arena.state(), self._now())
