@@ -12,9 +12,7 @@ examples:
 """
 
 import argparse
-import shlex
 import signal
-import sys
 from collections.abc import Callable
 from functools import partial
 from pathlib import Path
@@ -26,11 +24,11 @@ from tools.arguments import natural
 if TYPE_CHECKING:
     from fusion.hg_dagger import HgDagger
     from fusion.lira import LiraSettings, LiraSpf
+    from fusion.novice import LearningSettings
     from hal.messages import Decision
     from hal.port import Arena
     from hal.remote import RemoteRobot
 
-LABELS, RECORD, NOVICE = "labels.lira", "run.jsonl", "novice.safetensors"
 ENDPOINT = "127.0.0.1:7447"
 
 
@@ -55,6 +53,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="LIRA-SPF: who drives before the first training step (default: %(default)s)",
     )
     add(
+        "--idle-frames",
+        choices=("label", "skip"),
+        default="label",
+        help="steps with the dead-man held and the stick at rest: labels as all others, or none (default: %(default)s)",
+    )
+    add(
         "--teacher",
         choices=("none", "scripted", "perfect"),
         default="none",
@@ -67,7 +71,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="scripted teacher: give up after so many laps (default: %(default)s)",
     )
     add("--unseen", type=natural, default=0, help="then drive so many unseen layouts alone (default: %(default)s)")
-    add("--layout", type=natural, default=0, help="layout to learn on (default: %(default)s)")
+    add("--layout", type=natural, default=0, help="layout to learn on, and to reset a twin to (default: %(default)s)")
     add("--seed", type=natural, default=0, help="seeds teacher and training (default: %(default)s)")
     add("--run", type=Path, metavar="DIR", help="folder for what is learned (default: runs/<method>)")
     add("--as-command", help=argparse.SUPPRESS)  # what a report shows as the command that repeats the run
@@ -87,62 +91,25 @@ def run(args: argparse.Namespace) -> int:
     try:
         robot.open()
         if args.policy is not None:
-            return show_policy(args, robot)
-        return learn_from_person(args, robot) if args.teacher == "none" else learn_from_script(args, robot)
+            from tools.person import show_policy
+
+            return show_policy(args, robot, publisher(robot), say)
+        return learn_by_hand(args, robot) if args.teacher == "none" else learn_from_script(args, robot)
     finally:
         robot.close()
         bus.close()
 
 
-def show_policy(args: argparse.Namespace, robot: "RemoteRobot") -> int:
-    """Let one policy drive until Ctrl-C."""
-    from fusion.control import ControlLoop
-    from fusion.experts import load_expert
-    from fusion.journal import Journal
-    from fusion.method import Alone
-    from fusion.service import serve
-    from hal.server import stop_on_signal
-
-    expert = load_expert(args.policy, robot.profile)
-    loop = ControlLoop(robot)
-    with stop_on_signal() as stop:
-        loop.arm()
-        say(f"'{args.policy}' drives '{args.name}'; stop with Ctrl-C")
-        serve(loop, Alone(expert.name, expert.act), Journal(publish=publisher(robot)), stop, say)
-    return 0
-
-
-def learn_from_person(args: argparse.Namespace, robot: "RemoteRobot") -> int:
-    """Learn from whoever takes the wheel with the dead-man, until Ctrl-C; then save the novice."""
-    from fusion.control import ControlLoop
-    from fusion.demonstrations import DemonstrationLog, read_demonstrations
-    from fusion.journal import Journal
-    from fusion.learner import Label
-    from fusion.record import RunWriter
-    from fusion.service import serve
+def learn_by_hand(args: argparse.Namespace, robot: "RemoteRobot") -> int:
+    """Learn from whoever takes the wheel."""
     from fusion.trainer import ProcessTrainer
-    from hal.server import stop_on_signal
     from tools.assembly import apprentice
+    from tools.person import learn_from_person
 
-    folder: Path = args.run or Path("runs") / args.method
-    # The log goes first: if it is damaged, nothing else is touched.
-    with DemonstrationLog(folder / LABELS, robot.profile) as log, RunWriter(folder / RECORD) as record:
-        method = apprentice(lira_settings(args), robot.profile, args.seed, ProcessTrainer)
-        novice = method.novice
-        try:
-            for old in read_demonstrations(folder / LABELS):
-                if old.stored:
-                    novice.remember(Label(old.scan, old.image, old.action, old.source))
-            journal = Journal(keep=log.append, write=record.write, publish=publisher(robot))
-            with stop_on_signal() as stop:
-                loop = ControlLoop(robot)
-                loop.arm()
-                say(f"{args.method} learns on '{args.name}' with {novice.stored} labels; hold the dead-man to drive")
-                serve(loop, method, journal, stop, say, lambda: novice.training_steps)
-        finally:
-            novice.close()
-    save(folder, method, robot, args)
-    return 0
+    def make() -> "LiraSpf | HgDagger":
+        return apprentice(lira_settings(args), robot.profile, args.seed, ProcessTrainer, learning_settings(args))
+
+    return learn_from_person(args, robot, make, publisher(robot), say)
 
 
 def learn_from_script(args: argparse.Namespace, robot: "RemoteRobot") -> int:
@@ -169,12 +136,12 @@ def teach(args: argparse.Namespace, robot: "RemoteRobot", arena: "Arena", arena_
     from fusion.control import ControlLoop
     from fusion.demonstrations import DemonstrationLog
     from fusion.journal import Journal
-    from fusion.record import RunRecord, RunWriter
+    from fusion.record import RunWriter
     from fusion.session import Session
     from fusion.trainer import ProcessTrainer
     from sim_backend.world import World
     from tools.assembly import apprentice, lap, teacher
-    from tools.cli import version
+    from tools.run_folder import LABELS, RECORD, head, snapshot
 
     world = msgspec.json.decode(arena_info, type=World | None)
     if world is None:
@@ -185,12 +152,8 @@ def teach(args: argparse.Namespace, robot: "RemoteRobot", arena: "Arena", arena_
     profile = robot.profile
     in_step = partial(ProcessTrainer, adopt_after_s=profile.period_s)  # one period later, whatever it took
     with DemonstrationLog(folder / LABELS, profile) as log, RunWriter(folder / RECORD) as record:
-        command = args.as_command or shlex.join(["lira", *sys.argv[1:]])
-        preset = args.preset if args.method == "lira" else ""
-        record.write(
-            RunRecord(world.name, profile.name, args.method, preset, args.layout, args.seed, command, version())
-        )
-        method = apprentice(lira_settings(args), profile, args.seed, in_step)
+        record.write(head(args, profile, world.name))
+        method = apprentice(lira_settings(args), profile, args.seed, in_step, learning_settings(args))
         try:
             journal = Journal(keep=log.append, write=record.write, publish=publisher(robot))
             loop = ControlLoop(robot, truth=arena.state)
@@ -198,7 +161,7 @@ def teach(args: argparse.Namespace, robot: "RemoteRobot", arena: "Arena", arena_
             loop.arm()
             hand = teacher(args.teacher, profile, world, args.layout, args.seed)
             converged = session.teach([lap(profile, world, args.layout)], hand, args.train_laps)
-            save(folder, method, robot, args)
+            snapshot(folder, method.novice, profile, args)()
             session.show([lap(profile, world, args.layout + 1 + k) for k in range(args.unseen)])
             record.write(session.result(converged))
         finally:
@@ -215,16 +178,11 @@ def lira_settings(args: argparse.Namespace) -> "LiraSettings | None":
     return msgspec.structs.replace(PRESETS[args.preset], start=args.start) if args.method == "lira" else None
 
 
-def save(folder: Path, method: "LiraSpf | HgDagger", robot: "RemoteRobot", args: argparse.Namespace) -> None:
-    """Write the novice, if it has learned anything."""
-    from fusion.checkpoint import Checkpoint, save_checkpoint
+def learning_settings(args: argparse.Namespace) -> "LearningSettings":
+    """Return how labels become a policy, with either method."""
+    from fusion.novice import LearningSettings
 
-    if not method.novice.trained:
-        return
-    shape = robot.profile.features
-    command = args.as_command or shlex.join(["lira", *sys.argv[1:]])
-    about = Checkpoint("fusion", shape.bins, shape.filters, robot.profile.name, None, command, args.seed)
-    save_checkpoint(folder / NOVICE, method.novice.network, about)
+    return LearningSettings(idle_frames=args.idle_frames)
 
 
 def publisher(robot: "RemoteRobot") -> Callable[["Decision"], None]:
