@@ -68,6 +68,15 @@ def test_it_finds_the_speed_and_learns_the_topics(tmp_path, baud):
         assert not bench.unit.crashed
 
 
+def test_a_board_at_no_speed_of_a_core2_is_refused(tmp_path):
+    bench = Bench(tmp_path / "base", Firmware(baud=9600, boot_s=0.0))
+    bench.unit.receive(bytes.fromhex("fffe0000ff0000ff"), time.monotonic())  # it publishes, so something is heard
+    with pytest.raises(DeviceError, match="is no CORE2"):
+        bench.__enter__()
+    bench.__exit__()
+    assert not bench.unit.crashed
+
+
 def test_it_drives_reads_and_stands_when_closed(tmp_path):
     with Bench(tmp_path / "base") as bench:
         bench.keep(Twist(0.2, 0.5), 0.4)

@@ -11,6 +11,7 @@ from hal.profile import load_profile
 from robot.rosbot import Devices, Rosbot
 from robot.settings import BaseSettings, LidarSettings, Settings, load_settings
 from sim_backend.emulators.bench import WiredTwin
+from sim_backend.emulators.camera import MjpegServer
 from sim_backend.emulators.core2 import Firmware
 from sim_backend.twin import Twin
 
@@ -98,6 +99,38 @@ def test_unplugged_mid_drive_it_stands_and_resumes_after_return_and_a_neutral_co
         keep(robot, STOP, 0.1)
         assert keep(robot, GO, 1.0, drives).twist == GO
         assert robot.troubles() == {}
+
+
+def test_a_camera_that_goes_mid_drive_stops_it_and_it_resumes_after_its_return_and_a_neutral_command(tmp_path):
+    with wired(tmp_path) as bench, opened(bench, tmp_path) as robot:
+        keep(robot, STOP, 0.3)
+        assert keep(robot, GO, 1.0, drives).twist == GO
+        bench.camera.close()
+        gone_s = time.monotonic()
+        assert keep(robot, GO, 3.0, lambda applied: applied.twist == STOP).clamps == ("no_camera",)
+        assert time.monotonic() - gone_s < 0.5
+        assert "camera" in robot.troubles()
+        keep(robot, GO, 0.2)
+        assert bench.twin.state().linear_m_s == 0.0
+        bench.camera = MjpegServer(bench.camera.port)
+        assert keep(robot, GO, 8.0, lambda applied: applied.clamps == ("neutral_first",)).twist == STOP
+        keep(robot, STOP, 0.1)
+        assert keep(robot, GO, 1.0, drives).twist == GO
+
+
+def test_a_lidar_that_fails_mid_drive_stops_it_is_reset_and_it_resumes_after_a_neutral_command(tmp_path):
+    with wired(tmp_path) as bench, opened(bench, tmp_path) as robot:
+        keep(robot, STOP, 0.3)
+        assert keep(robot, GO, 1.0, drives).twist == GO
+        bench.lidar.failed, bench.lidar.mode = True, None  # its motor is stuck: it stops and reports an error
+        failed_s = time.monotonic()
+        applied = keep(robot, GO, 3.0, lambda applied: applied.twist == STOP)
+        assert applied.clamps == ("no_lidar",)
+        assert time.monotonic() - failed_s < 0.8  # the last scan may be 0.5 s old
+        assert keep(robot, GO, 10.0, lambda applied: applied.clamps == ("neutral_first",)).twist == STOP
+        assert not bench.lidar.failed
+        keep(robot, STOP, 0.1)
+        assert keep(robot, GO, 1.0, drives).twist == GO
 
 
 def test_a_reset_of_the_board_stops_it_until_the_board_is_back(tmp_path):

@@ -128,6 +128,13 @@ def test_a_broken_unit_is_refused_with_its_code(tmp_path):
         assert "turn freely" in refused.value.remedy
 
 
+def test_a_unit_at_no_speed_of_an_rplidar_is_refused(tmp_path):
+    bench = Bench(tmp_path / "lidar", Model(baud=9600))
+    bench.unit.pwm, bench.unit.mode = 660, STANDARD_MODE  # it streams, so something is heard
+    with bench, pytest.raises(DeviceError, match="is no RPLIDAR"):
+        bench.keeper.wait_alive(5.0)
+
+
 def test_garbage_and_loss_are_survived_and_counted(tmp_path):
     with Bench(tmp_path / "lidar") as bench:
         bench.wait_scans(1)
