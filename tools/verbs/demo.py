@@ -40,7 +40,7 @@ STALL_S = 60.0
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
     add = parser.add_argument
-    add("--world", default="line-obstacles", help="world by name or .toml file (default: %(default)s)")
+    add("--world", help="world by name or .toml file (default: line-obstacles; with --wire lane, which is shorter)")
     add("--profile", default="thesis-sim", help="robot by name or .toml file (default: %(default)s)")
     add("--seed", type=natural, default=0, help="seeds teacher, training and noise (default: %(default)s)")
     add("--layout", type=natural, default=0, help="layout to learn on (default: %(default)s)")
@@ -64,7 +64,8 @@ def run(args: argparse.Namespace) -> int:
 
     # What cannot work is refused before anything starts.
     profile = load_profile(args.profile)
-    load_world(args.world)
+    world = args.world or ("lane" if args.wire else "line-obstacles")
+    load_world(world)
     for expert in SHIPPED:
         expert_path(expert, profile)
     for package, extra in {**NEEDED, **(NEEDED_BY_WIRE if args.wire else {})}.items():
@@ -74,7 +75,7 @@ def run(args: argparse.Namespace) -> int:
     port = free_port()
     name, endpoint = f"demo_{port}", f"127.0.0.1:{port}"
     both = ["--layout", str(args.layout), "--seed", str(args.seed)]
-    twin = ["--world", args.world, "--profile", args.profile, *both]
+    twin = ["--world", world, "--profile", args.profile, *both]
     unseen = args.unseen if args.unseen is not None else 1 if args.wire else 3
     fusion = [*both, "--name", name, "--connect", endpoint, "--method", "lira", "--teacher", "scripted"]
     fusion += ["--run", str(folder), "--train-laps", str(args.laps), "--unseen", str(unseen)]
