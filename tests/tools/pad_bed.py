@@ -60,7 +60,8 @@ class Bed:
     def environment(self) -> list[str]:
         # The nodes are terminals underneath, and one that goes away hangs up on a session's leader.
         deaf = ["sh", "-c", 'trap "" HUP; exec "$@"', "sh"]
-        return [*deaf, "env", "LD_PRELOAD=libumockdev-preload.so.0", f"UMOCKDEV_DIR={self.root}"]
+        state = f"XDG_STATE_HOME={self._folder}/state"
+        return [*deaf, "env", state, "LD_PRELOAD=libumockdev-preload.so.0", f"UMOCKDEV_DIR={self.root}"]
 
     def close(self) -> None:
         self._end.set()

@@ -1,7 +1,9 @@
 """The bridge on real evdev traffic: discovery, driving, unplug, return, freeze, second node, missing permission."""
 
 import itertools
+import json
 import os
+import signal
 import sys
 import time
 
@@ -10,8 +12,8 @@ from pad_bed import SONY, Bed, library
 
 from hal.bus import Bus
 from hal.estop import look_at_estop
-from hal.messages import STOP, Reason, Source
-from hal.topics import APPLIED, JOY, TELEOP
+from hal.messages import STOP, OperatorRequest, Reason, Request, Source
+from hal.topics import APPLIED, JOY, OPERATOR, TELEOP
 from tools.bench import null_robot
 from tools.processes import ChildProcess, free_port, lira_command
 
@@ -19,6 +21,7 @@ if library() is None:
     pytest.skip("needs libumockdev (Debian package umockdev)", allow_module_level=True)
 
 PAD, MOTION = 5, 4
+AS_A_USER = ["setpriv", "--bounding-set=-dac_override,-dac_read_search"] if os.geteuid() == 0 else []
 NUMBERS = itertools.count()
 
 
@@ -92,6 +95,13 @@ class Rig:
         self.bed.key(PAD, "BTN_TL", 1)
         self.says("you drive")
         self.drives(0.0)
+        self.bed.axis(PAD, "ABS_Y", 0)
+        self.drives(0.5)
+
+    def begin_again(self):
+        """As `begin`, after the pad was lost."""
+        self.bed.key(PAD, "BTN_TL", 1)
+        self.says("you drive", times=2)
         self.bed.axis(PAD, "ABS_Y", 0)
         self.drives(0.5)
 
@@ -232,12 +242,50 @@ def test_a_pad_that_is_switched_on_later_is_found(bed, start):
 def test_a_pad_that_may_not_be_opened_is_named_with_the_remedy(bed, start):
     bed.plug(PAD)
     bed.forbid(PAD, 0)
-    root = ["setpriv", "--bounding-set=-dac_override,-dac_read_search"] if os.geteuid() == 0 else []
-    rig = start(prefix=root)
+    rig = start(prefix=AS_A_USER)
     assert rig.process.wait(20.0) == 2
     what, remedy = rig.process.output().splitlines()[-2:]
     assert what == f"lira joystick: no permission to open {SONY} (/dev/input/event5)"
     assert "60-lira-pad.rules" in remedy
+
+
+def test_permission_that_is_lost_while_it_drives_stops_the_robot_and_comes_back_by_itself(bed, start):
+    bed.plug(MOTION, f"{SONY} Motion Sensors", motion=True)
+    bed.plug(PAD)
+    rig = start(prefix=AS_A_USER)
+    rig.says("ready: hold the dead-man")
+    rig.begin()
+    bed.forbid(PAD, 0)
+    rig.stands()
+    rig.says(f"no permission to read {SONY} (/dev/input/event5) any more")
+    rig.zeros_then_silence(released=False)
+    rig.says(f"no permission to open {SONY}")
+    bed.forbid(PAD, 0o600)
+    rig.says(f"pad: {SONY}", times=2)
+    rig.let_go()
+    rig.says("ready: hold the dead-man", times=2)
+    rig.begin_again()
+
+
+def test_what_was_learned_about_the_pad_outlives_the_bridge(rig, bed, start, tmp_path):
+    rig.process.signal(signal.SIGKILL)
+    rig.process.wait(10.0)
+    (pad, traits), *others = json.loads((tmp_path / "state" / "lira" / "pads.json").read_text()).items()
+    assert not others
+    assert pad == f"054c/0268/{SONY}/00:11:22:33:44:55"
+    assert 0.1 <= traits["timeout_s"] <= 0.4
+    start().says("ready: hold the dead-man")
+
+
+def test_buttons_ask_while_the_hand_is_off_and_say_that_nobody_answers(rig, bus):
+    asked = Watcher(bus, OPERATOR)
+    for button, request in (("BTN_WEST", Request.PAUSE), ("BTN_NORTH", Request.SAVE), ("BTN_EAST", Request.RESET)):
+        rig.bed.key(PAD, button, 1)
+        wait_for(lambda request=request: asked.last() == OperatorRequest(request), rig.process.output)
+        rig.bed.key(PAD, button, 0)
+    assert len(asked.all()) == 3
+    rig.says("nobody answers to 'reset': does lira fusion run?")
+    assert rig.applied.last().source is Source.NONE
 
 
 def test_a_device_that_is_no_pad_is_refused(bed, start):
@@ -254,13 +302,14 @@ def test_learn_asks_and_writes_a_file_that_loads(bed, start, tmp_path):
     for words, name, value, rest in (
         ("FORWARD", "ABS_Y", 0, 128), ("LEFT", "ABS_RX", 0, 128), ("DEAD-MAN", "BTN_TR", 1, 0),
         ("TURBO", "BTN_TL", 1, 0), ("EMERGENCY STOP", "BTN_EAST", 1, 0), ("RELEASES", "BTN_NORTH", 1, 0),
+        ("PAUSES", "BTN_WEST", 1, 0),
     ):  # fmt: skip
         rig.says(f"{words}")
         send = bed.axis if name.startswith("ABS") else bed.key
         send(PAD, name, value)
         rig.says(f"... {name}")
         send(PAD, name, rest)
-    assert rig.process.wait(10.0) == 0
+    assert rig.process.wait(30.0) == 0  # save and reset go unanswered
     from tools.joystick.mapping import load_mapping
 
     mapping = load_mapping(str(path))
@@ -268,3 +317,4 @@ def test_learn_asks_and_writes_a_file_that_loads(bed, start, tmp_path):
     assert (mapping.dead_man, mapping.turbo, mapping.estop, mapping.release) == (
         "BTN_TR", "BTN_TL", ("BTN_EAST",), "BTN_NORTH",
     )  # fmt: skip
+    assert (mapping.pause, mapping.save, mapping.reset, mapping.experts) == ("BTN_WEST", None, None, ())

@@ -27,6 +27,7 @@ from tools.bench import Row, null_robot
 from tools.joystick.bridge import Bridge
 from tools.joystick.codes import AXES, BUTTONS, EV_ABS, EV_KEY, EV_SYN
 from tools.joystick.mapping import Mapping, load_mapping
+from tools.joystick.memory import PadMemory
 from tools.joystick.stick import AxisRange, PadEvent, PadState
 from tools.joystick.wheel import Wheel
 from tools.processes import ChildProcess, free_port
@@ -42,7 +43,7 @@ REPORT = struct.Struct("<HHi")
 class PipePad:
     """A pad at the end of a pipe."""
 
-    name = "a pipe"
+    name = key = "a pipe"
     has_motion = False
 
     def __init__(self) -> None:
@@ -151,7 +152,7 @@ def bridge(name: str, endpoint: str, mapping: Mapping, pad: PipePad) -> Iterator
     """The bridge on that pad."""
     with bus_of(name, endpoint) as bus, bus_of(name, endpoint, watch=True) as watch:
         stop = threading.Event()
-        loop = Bridge(mapping, Wheel(bus, watch, READY_S, lambda _: None), lambda: pad, lambda _: None)
+        loop = Bridge(mapping, Wheel(bus, watch, READY_S, lambda _: None), lambda: pad, PadMemory(None), lambda _: None)
         with running(lambda: loop.run(stop), stop):
             yield
 

@@ -1,4 +1,4 @@
-"""The keyboard as a pad, for who has none: SPACE is the dead-man, arrows the stick. Pure.
+"""The keyboard as a pad, for who has none: SPACE is the dead-man, arrows the stick, letters and digits ask. Pure.
 
 It drives the same `Hand` as a pad, so it locks, gives back and stops in the same way.
 """
@@ -9,7 +9,19 @@ from tools.joystick.codes import AXES, BUTTONS
 from tools.joystick.mapping import Mapping, load_mapping
 from tools.joystick.stick import PadState
 
-KEYS = {"space": "BTN_TL", "left shift": "BTN_TR", "escape": "BTN_MODE", "f1": "BTN_START"}
+KEYS = {
+    "space": "BTN_TL",
+    "left shift": "BTN_TR",
+    "escape": "BTN_MODE",
+    "f1": "BTN_START",
+    "p": "BTN_WEST",
+    "s": "BTN_NORTH",
+    "r": "BTN_EAST",
+    "1": "BTN_DPAD_UP",
+    "2": "BTN_DPAD_RIGHT",
+    "3": "BTN_DPAD_DOWN",
+    "4": "BTN_DPAD_LEFT",
+}
 REST, LOW, HIGH = 128, 0, 255
 
 

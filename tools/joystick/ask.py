@@ -5,13 +5,13 @@ import time
 from pathlib import Path
 
 from hal.errors import DeviceError, StorageError
-from tools.joystick.learn import ASKS, moved_axis, pressed_button, to_toml
+from tools.joystick.learn import ASKS, Ask, moved_axis, pressed_button, to_toml
 from tools.joystick.mapping import Axis
 from tools.joystick.nodes import Node, is_any_pad, read_nodes
 from tools.joystick.pad import Pad
 from tools.joystick.stick import PadState
 
-ANSWER_S = 30.0
+ANSWER_S, OPTIONAL_S = 30.0, 8.0
 LOOK_S = 0.1
 
 
@@ -27,7 +27,11 @@ def learn(path: Path, device: str | None) -> int:
         for ask in ASKS:
             rest = pad.state
             print(f"  {ask.words} ... ", end="", flush=True)
-            found[ask.key] = answer = _answer(pad, rest, is_axis=ask.is_axis, taken=list(found.values()))
+            answer = _answer(pad, rest, ask, taken=list(found.values()))
+            if answer is None:
+                print("none", flush=True)
+                continue
+            found[ask.key] = answer
             print(answer.axis if isinstance(answer, Axis) else answer, flush=True)
             _wait_for_rest(pad, rest, answer)
     finally:
@@ -47,14 +51,16 @@ def _find(device: str | None) -> Node:
     return nodes[0]
 
 
-def _answer(pad: Pad, rest: PadState, *, is_axis: bool, taken: list[Axis | str]) -> Axis | str:
+def _answer(pad: Pad, rest: PadState, ask: Ask, taken: list[Axis | str]) -> Axis | str | None:
     names = [other.axis if isinstance(other, Axis) else other for other in taken]
-    deadline_s = time.monotonic() + ANSWER_S
+    deadline_s = time.monotonic() + (OPTIONAL_S if ask.optional else ANSWER_S)
     while time.monotonic() < deadline_s:
         for state in _look(pad):
-            answer = moved_axis(rest, state) if is_axis else pressed_button(rest, state)
+            answer = moved_axis(rest, state) if ask.is_axis else pressed_button(rest, state)
             if answer is not None and (answer.axis if isinstance(answer, Axis) else answer) not in names:
                 return answer
+    if ask.optional:
+        return None
     raise DeviceError("nothing was pressed", "Start again, and press one control at a time.")
 
 

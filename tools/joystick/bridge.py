@@ -11,7 +11,9 @@ from hal.messages import Applied, Reason
 from tools.joystick.freeze import FreezeWatch
 from tools.joystick.hand import Hand, Order, State
 from tools.joystick.mapping import Mapping
-from tools.joystick.rumble import CALLS, Rumble, pattern_of
+from tools.joystick.memory import PadMemory
+from tools.joystick.requests import RequestButtons
+from tools.joystick.rumble import CALLS, TAKEN, Rumble, pattern_of
 from tools.joystick.stick import PadState
 from tools.joystick.wheel import Wheel
 
@@ -31,6 +33,7 @@ class OpenPad(Protocol):
     """A pad that can be read; `tools.joystick.pad.Pad` is the real one."""
 
     name: str
+    key: str
     state: PadState
 
     @property
@@ -53,6 +56,8 @@ class OpenPad(Protocol):
 class Bridge:
     """Connects one pad with one robot. `find` opens the pad when it is there; `say` gets a line now and then.
 
+    `memory` keeps what is learned about each pad.
+
     Raises what `find` raises if the pad that is there cannot be opened; once running it keeps trying instead.
     """
 
@@ -61,13 +66,16 @@ class Bridge:
         mapping: Mapping,
         wheel: Wheel,
         find: Callable[[], OpenPad | None],
+        memory: PadMemory,
         say: Callable[[str], None] = print,
     ) -> None:
         self._mapping = mapping
         self._wheel = wheel
         self._open_pad = find
+        self._memory = memory
         self._say = say
         self._hand = Hand(mapping)
+        self._buttons = RequestButtons(mapping)
         self._rumble = Rumble()
         self._watch = FreezeWatch()
         self._awake_s = 0.0  # time without our own stalls: those are no silence of the pad
@@ -89,6 +97,7 @@ class Bridge:
             if self._sent.action is not None:
                 self._wheel.drive((0.0, 0.0), self._sent.released, time.monotonic())
             if self._pad is not None:
+                self._remember(self._pad)
                 self._pad.close()
 
     def _step(self) -> None:
@@ -118,7 +127,10 @@ class Bridge:
             self._lose(error.what)
             return []
         if heard:
+            new = self._watch.learned_s is None
             self._watch.note(self._awake_s)
+            if new:
+                self._remember(self._pad)
         return states
 
     def _tick(self, now_s: float) -> None:
@@ -130,6 +142,7 @@ class Bridge:
             self._wheel.show(*_joy(self._pad.state, self._mapping), now_s)
         self._feel(now_s)
         self._explain(applied)
+        self._hear(now_s)
 
     def _order(self, state: PadState | None, now_s: float, *, tick: bool = False) -> None:
         """Let the hand decide. What changes who drives goes out at once, the rest at the tick."""
@@ -138,6 +151,10 @@ class Bridge:
         order = self._hand.update(state, now_s, not watched or self._is_alive())
         if order.estop is not None:
             self._wheel.estop(order.estop)
+        pressed = state if self._is_alive() else None
+        wheel = self._wheel
+        for request in self._buttons.update(pressed, now_s, paused=wheel.paused, experts=wheel.experts):
+            wheel.ask(request, now_s)
         changed = self._hand.state is not before
         if order.action is not None and (tick or changed):
             self._wheel.drive(order.action, order.released, now_s)
@@ -164,17 +181,32 @@ class Bridge:
         self._pad = self._open_pad()
         if self._pad is None:
             return
-        self._watch = FreezeWatch()
+        self._watch = FreezeWatch(self._memory.timeout_s(self._pad.key))
         self._tell(f"pad: {self._pad.name}" + (", with motion sensors" if self._pad.has_motion else ""))
         if self._mapping.freeze and not self._pad.has_motion:
             self._tell("its motion sensors are not there, so nobody will notice if it freezes")
 
     def _lose(self, why: str) -> None:
         assert self._pad is not None
+        self._remember(self._pad)
         self._pad.close()
         self._pad = None
         self._tell(why)
         self._order(None, time.monotonic(), tick=True)
+
+    def _remember(self, pad: OpenPad) -> None:
+        """Keep what was learned about how long this pad is silent, if it is never silent for long."""
+        if pad.has_motion and self._watch.learned_s is not None:
+            self._memory.keep(pad.key, self._watch.learned_s)
+
+    def _hear(self, now_s: float) -> None:
+        """Pass on what was answered to requests."""
+        for answer in self._wheel.answers():
+            self._say(f"learner: {answer.words}")
+            if answer.accepted:
+                self._rumble.play(TAKEN, now_s)
+        if (request := self._wheel.unanswered(now_s)) is not None:
+            self._say(f"nobody answers to '{request}': does lira fusion run?")
 
     def _feel(self, now_s: float) -> None:
         """Rumble for what was asked on `joy/feedback`, and for the learner's calls as they begin."""

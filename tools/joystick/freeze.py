@@ -12,15 +12,24 @@ SHORTEST_S, LONGEST_S = 0.10, 0.40  # and within these
 
 
 class FreezeWatch:
-    """Learns how long one pad is silent at most, and says when it is silent for longer."""
+    """Learns how long one pad is silent at most, and says when it is silent for longer.
 
-    def __init__(self) -> None:
+    `known_s` is the time-out that was learned earlier: it holds until there is a new one.
+    """
+
+    def __init__(self, known_s: float | None = None) -> None:
+        self._known_s = known_s
         self._gaps_s: deque[float] = deque(maxlen=GAPS)
         self._last_s: float | None = None
 
     @property
     def timeout_s(self) -> float | None:
-        """Silence that counts as a freeze; None until enough of the pad's events were seen."""
+        """Silence that counts as a freeze; None until enough of the pad's events were seen, now or earlier."""
+        return self._known_s if self.learned_s is None else self.learned_s
+
+    @property
+    def learned_s(self) -> float | None:
+        """As `timeout_s`, from the events that came now."""
         if len(self._gaps_s) < GAPS:
             return None
         return min(LONGEST_S, max(SHORTEST_S, MARGIN * max(self._gaps_s)))
@@ -31,6 +40,7 @@ class FreezeWatch:
             gap_s = now_s - self._last_s
             if gap_s > (self.timeout_s or LONGEST_S):
                 self._gaps_s.clear()
+                self._known_s = None
             else:
                 self._gaps_s.append(gap_s)
         self._last_s = now_s

@@ -11,11 +11,12 @@ MOVED = 0.7  # share of an axis's way from where it rested
 
 @dataclass(frozen=True, slots=True)
 class Ask:
-    """One question: the key it fills, what to say, and whether an axis answers it."""
+    """One question: the key it fills, what to say, whether an axis answers it, and whether it may go unanswered."""
 
     key: str
     words: str
     is_axis: bool = False
+    optional: bool = False
 
 
 ASKS = (
@@ -25,6 +26,9 @@ ASKS = (
     Ask("turbo", "press TURBO (another shoulder button)"),
     Ask("estop", "press the EMERGENCY STOP (one that you find without looking)"),
     Ask("release", "press the button that RELEASES the emergency stop when held"),
+    Ask("pause", "press the button that PAUSES driving and learning, or wait to do without", optional=True),
+    Ask("save", "press the button that SAVES what was learned, or wait to do without", optional=True),
+    Ask("reset", "press the button that begins a new EPISODE when held, or wait to do without", optional=True),
 )
 
 
@@ -43,9 +47,11 @@ def pressed_button(rest: PadState, now: PadState) -> str | None:
 
 
 def to_toml(name: str, found: dict[str, Axis | str], axes: frozenset[int], buttons: frozenset[int]) -> str:
-    """The file: what was found, and every control in the order of its number for `joy`."""
+    """The file: what was found by key, and every control in the order of its number for `joy`."""
     lines = [f"name = {_quoted(name)}"]
     for ask in ASKS:
+        if ask.key not in found:
+            continue
         value = found[ask.key]
         if isinstance(value, Axis):
             lines.append(f'{ask.key} = {{ axis = "{value.axis}", inverted = {str(value.inverted).lower()} }}')

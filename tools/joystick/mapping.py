@@ -24,6 +24,7 @@ class Axis(Table, frozen=True):
 class Mapping(Table, frozen=True):
     """One kind of pad. Controls go by their names in linux/input-event-codes.h; see `pads/ps3.toml` for what each does.
 
+    What `pause`, `reset`, `save` and `experts` (who gets the wheel) ask is not for every pad: they may be left out.
     `freeze` says that a live pad of this kind is never silent. `axes` and `buttons` are the order of `joy`.
     """
 
@@ -34,6 +35,10 @@ class Mapping(Table, frozen=True):
     turbo: str
     estop: Annotated[tuple[str, ...], Meta(min_length=1)]
     release: str
+    pause: str | None = None
+    reset: str | None = None
+    save: str | None = None
+    experts: tuple[str, ...] = ()
     dead_zone: Annotated[float, Meta(ge=0.0, le=0.9)] = 0.12
     expo: Share = 0.4
     cruise: Annotated[float, Meta(gt=0.0, le=1.0)] = 0.5
@@ -43,7 +48,8 @@ class Mapping(Table, frozen=True):
 
     def __post_init__(self) -> None:
         """Check the names: raises `ValueError`, which loading turns into a `ConfigError`."""
-        used = [self.dead_man, self.turbo, *self.estop, self.release]
+        asking = [name for name in (self.pause, self.reset, self.save) if name]
+        used = [self.dead_man, self.turbo, *self.estop, self.release, *asking, *self.experts]
         for name in (*used, *self.buttons):
             if name not in BUTTONS:
                 raise ValueError(f"there is no button named {name}")
@@ -51,7 +57,7 @@ class Mapping(Table, frozen=True):
             if name not in AXES:
                 raise ValueError(f"there is no axis named {name}")
         if len(set(used)) < len(used):
-            raise ValueError("dead_man, turbo, estop and release must be different buttons")
+            raise ValueError("dead_man, turbo, estop, release and what asks for something must be different buttons")
         if self.forward.axis == self.turn.axis:
             raise ValueError("forward and turn must be different axes")
 

@@ -33,6 +33,11 @@ class Node:
         """Vendor, product, name and, where the pad has one, its own address."""
         return self.vendor, self.product, self.name, self.uniq
 
+    @property
+    def key(self) -> str:
+        """The identity as one word, to keep things by."""
+        return "/".join(self.identity)
+
     def __str__(self) -> str:
         return f"{self.name} ({self.path})"
 

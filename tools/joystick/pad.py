@@ -1,6 +1,8 @@
 """A pad's device: opened, read without waiting, made to rumble. The only page that needs `evdev`."""
 
+import os
 from collections.abc import Sequence
+from pathlib import Path
 from typing import Any
 
 import evdev
@@ -48,6 +50,8 @@ class Pad:
 
     def __init__(self, node: Node, motion: Node | None = None) -> None:
         self.name = str(node)
+        self.key = node.key
+        self._path = Path(node.path)
         self._device = _open(node)
         self.state = self._whole_state()
         self._dropped = False
@@ -66,8 +70,10 @@ class Pad:
     def read(self) -> tuple[list[PadState], bool]:
         """States after each report since the last call, and whether anything came at all, motion included.
 
-        Raises `DeviceError` when the pad is gone.
+        Raises `DeviceError` when the pad is gone, or is no longer ours to read: an open device would not say that.
         """
+        if self._path.exists() and not os.access(self._path, os.R_OK):
+            raise DeviceError(f"no permission to read {self.name} any more", REMEDY)
         moved = bool(_read(self._motion)) if self._motion is not None else False
         events = _read(self._device)
         states: list[PadState] = []

@@ -7,6 +7,8 @@ Pattern = tuple[tuple[float, float], ...]
 # Attention: two short taps. Feedback ("you decide"): three long, strong ones.
 ATTENTION: Pattern = ((0.5, 0.12), (0.0, 0.10), (0.5, 0.12))
 FEEDBACK: Pattern = ((1.0, 0.35), (0.0, 0.12), (1.0, 0.35), (0.0, 0.12), (1.0, 0.35))
+# A request was taken: one tap.
+TAKEN: Pattern = ((0.5, 0.08),)
 CALLS = {"attention": ATTENTION, "feedback": FEEDBACK}
 
 # `JoyFeedback.id` of our patterns; any other id is a plain rumble of the message's intensity.

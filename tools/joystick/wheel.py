@@ -11,11 +11,33 @@ from hal.clock import ClockEstimate
 from hal.desk import LOCKSTEP, info_from_json
 from hal.errors import BusError
 from hal.estop import press_estop, release_estop
-from hal.messages import Action, Applied, Bool, Decision, Joy, JoyFeedback, Twist
+from hal.messages import (
+    Action,
+    Applied,
+    Bool,
+    Decision,
+    Joy,
+    JoyFeedback,
+    OperatorAnswer,
+    OperatorRequest,
+    Request,
+    Twist,
+)
 from hal.profile import RobotProfile
-from hal.topics import APPLIED, DECISION, ESTOP, INFO, JOY, JOY_FEEDBACK, TELEOP
+from hal.topics import (
+    APPLIED,
+    DECISION,
+    ESTOP,
+    INFO,
+    JOY,
+    JOY_FEEDBACK,
+    OPERATOR,
+    OPERATOR_ANSWER,
+    TELEOP,
+)
 
 DEPTH = 16
+ANSWER_S = 2.0  # after that nobody will answer a request
 
 
 class Wheel:
@@ -37,6 +59,12 @@ class Wheel:
         self._results = bus.reader(APPLIED, DEPTH)
         self._feedback = watch.reader(JOY_FEEDBACK, DEPTH)
         self._decisions = watch.reader(DECISION)
+        self._requests = bus.publisher(OPERATOR)
+        self._answers = watch.reader(OPERATOR_ANSWER, DEPTH)
+        self._answered = 0
+        self._asked: tuple[Request, float] | None = None  # and when, until it is answered
+        self.paused = False
+        self.experts: tuple[str, ...] = ()
         self._clock = ClockEstimate()
         self._epoch = -1
 
@@ -77,7 +105,34 @@ class Wheel:
 
     def decisions(self) -> list[Decision]:
         """What the learner has decided since the last time, as far as it was heard."""
-        return [received.message for received in self._decisions.poll()]
+        decisions = [received.message for received in self._decisions.poll()]
+        if decisions:
+            self.experts = tuple(expert.name for expert in decisions[-1].experts)
+        return decisions
+
+    def ask(self, request: OperatorRequest, local_s: float) -> None:
+        """Ask something of whoever drives and learns; nothing before the robot was heard."""
+        if self._clock.known:
+            self._requests.put(request, self._clock.now(local_s))
+            self._asked = request.request, local_s
+
+    def answers(self) -> list[OperatorAnswer]:
+        """What was answered since the last time, to whomever."""
+        new = []
+        for answer in (received.message for received in self._answers.poll()):
+            self.paused = answer.paused
+            if answer.count not in (0, self._answered):
+                new.append(answer)
+                self._asked = None
+            self._answered = answer.count
+        return new
+
+    def unanswered(self, local_s: float) -> Request | None:
+        """What was asked so long ago that nobody will answer. Tells it once."""
+        if self._asked is None or local_s - self._asked[1] < ANSWER_S:
+            return None
+        request, self._asked = self._asked[0], None
+        return request
 
     def estop(self, pressed: bool) -> None:
         """Press or release the emergency stop: at once on the topic, and by a query that waits aside for its answer."""

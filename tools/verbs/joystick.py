@@ -1,7 +1,8 @@
 """Drive by hand: a gamepad on this machine, straight to the robot. Needs no screen.
 
 Hold the dead-man (L1) to drive with the left stick, turbo (R1) for full speed. PS or SELECT is the emergency stop;
-START, held for a second, releases it. Letting go of the dead-man gives the wheel back at once.
+START, held for a second, releases it. Letting go of the dead-man gives the wheel back at once. Square pauses and goes
+on, triangle saves, circle, held for a second, begins anew; the d-pad gives the wheel to an expert.
 
 examples:
   lira joystick                                     the first pad that has the controls of a PS3 pad
@@ -48,6 +49,7 @@ def run(args: argparse.Namespace) -> int:
     from hal.server import stop_on_signal
     from hal.topics import INFO
     from tools.joystick.bridge import Bridge
+    from tools.joystick.memory import PadMemory, state_file
     from tools.joystick.wheel import Wheel
 
     bus, watch = Bus(args.name, connect=args.connect), None
@@ -56,7 +58,7 @@ def run(args: argparse.Namespace) -> int:
             bus.ask(INFO, timeout_s=ANSWER_S)
             watch = Bus(args.name, connect=args.connect, watch=True)
             wheel = Wheel(bus, watch, ANSWER_S, say)
-            bridge = Bridge(mapping, wheel, Finder(mapping, args.device), say)
+            bridge = Bridge(mapping, wheel, Finder(mapping, args.device), PadMemory(state_file(), say), say)
             say(f"joystick drives '{args.name}' at {args.connect}; stop with Ctrl-C")
             bridge.run(stop)
     finally:
