@@ -1,12 +1,14 @@
 """What differs from one ROSbot to the next: how its parts are mounted, how its wheels measure. A TOML file."""
 
 import math
+import re
 from pathlib import Path
 from typing import Annotated
 
 from msgspec import Meta
 
-from hal.config import Table, load_toml
+from hal.config import Table, load_toml, parse_toml
+from hal.errors import StorageError
 
 Scale = Annotated[float, Meta(gt=0.5, lt=2.0)]
 Seconds = Annotated[float, Meta(ge=0.0, le=10.0)]
@@ -45,3 +47,37 @@ class Settings(Table, frozen=True):
 def load_settings(path: Path | None) -> Settings:
     """Read a file of settings; without one everything is as delivered. Raises `ConfigError`."""
     return Settings() if path is None else load_toml(path, Settings)
+
+
+def write_base_setting(path: Path, key: str, value: float) -> None:
+    """Set a key of the table `base` in a file of settings, and leave the rest as it is; makes the file if need be.
+
+    Raises `ConfigError` for a file that is none, `StorageError` if it cannot be written. It is whole at any time.
+    """
+    load_settings(path if path.exists() else None)
+    text = set_key(path.read_text(encoding="utf-8") if path.exists() else "", "base", key, f"{value:.4f}")
+    parse_toml(text, Settings, str(path))
+    new = path.with_name(path.name + ".new")
+    try:
+        new.write_text(text, encoding="utf-8")
+        new.replace(path)
+    except OSError as error:
+        raise StorageError(f"cannot write {path}: {error.strerror}", "Choose another file.") from error
+
+
+def set_key(text: str, table: str, key: str, value: str) -> str:
+    """Set a key of a table in TOML text: its line is changed, or added, and every other line kept."""
+    lines = text.splitlines()
+    heads = [number for number, line in enumerate(lines) if re.match(r"\s*\[", line)]
+    start = next((number for number in heads if re.match(rf"\s*\[\s*{table}\s*\]", lines[number])), None)
+    if start is None:
+        return "\n".join([*lines, *([""] if lines else []), f"[{table}]", f"{key} = {value}", ""])
+    end = next((number for number in heads if number > start), len(lines))
+    for number in range(start + 1, end):
+        found = re.match(rf"(\s*{key}\s*=\s*)[^#]*?(\s*(?:#.*)?)$", lines[number])
+        if found is not None:
+            lines[number] = f"{found[1]}{value}{found[2]}"
+            break
+    else:
+        lines.insert(start + 1, f"{key} = {value}")
+    return "\n".join([*lines, ""])

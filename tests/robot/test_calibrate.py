@@ -1,0 +1,222 @@
+"""The base is calibrated through the real wire protocols: what it reports wrongly on purpose is found and written."""
+
+import contextlib
+import math
+import re
+import threading
+import time
+from contextlib import contextmanager
+
+import numpy as np
+import pytest
+
+from hal.errors import ConfigError
+from hal.messages import STOP, LaserScan, Odometry
+from robot.calibration import turn_between, wall_ahead_m
+from robot.line import Line
+from robot.settings import load_settings, set_key, write_base_setting
+from sim_backend.emulators.core2 import Core2Unit, Firmware
+from sim_backend.emulators.rplidar import RplidarUnit
+from sim_backend.emulators.wire import Wire
+from tools.cli import main
+from tools.verbs import calibrate
+
+WALLS_M = (3.0, 1.7, -1.0, -1.3)  # ahead, left, behind, right of where it starts
+NO_FIELD = ["--profile", "thesis-sim"]  # whose robot may be driven without a lidar
+QUICK = "# mine\n[lidar]\nspin_up_s = 0.0  # it turns\n\n[base]\nboot_s = 0.2\n"
+
+
+def to_walls(x_m, y_m, bearing):
+    """Distances to the walls of the room at these bearings in the room's frame."""
+    ahead, left = np.cos(bearing), np.sin(bearing)
+    with np.errstate(divide="ignore"):
+        along = np.where(ahead > 0, (WALLS_M[0] - x_m) / ahead, (WALLS_M[2] - x_m) / ahead)
+        across = np.where(left > 0, (WALLS_M[1] - y_m) / left, (WALLS_M[3] - y_m) / left)
+    return np.minimum(along, across)
+
+
+class Room:
+    """A robot in a room: it really goes `far` times as far, and turns `much` times as much, as its board reports."""
+
+    def __init__(self, far=1.0, much=1.0):
+        self._far, self._much = far, much
+        self._lock = threading.Lock()
+        self._twist, self._since_s = STOP, time.monotonic()
+        self.true = self._told = (0.0, 0.0, 0.0)
+        self.twists = []
+        self.held = False  # the wheels are blocked
+
+    def drive(self, twist):
+        with self._lock:
+            self._advance()
+            self._twist = twist
+            self.twists.append(twist)
+
+    def measure(self):
+        with self._lock:
+            self._advance()
+            return Odometry(0.0, *self._told, self._twist.linear_m_s, self._twist.angular_rad_s)
+
+    def distances(self, theta_rad):
+        x_m, y_m, yaw_rad = self.true
+        return np.clip(to_walls(x_m, y_m, yaw_rad - theta_rad), 0.0, 12.0)
+
+    def put_back(self):
+        """Somebody carries it to where it began: the board does not notice."""
+        self.true = (0.0, 0.0, 0.0)
+
+    def _advance(self):
+        now_s = time.monotonic()
+        dt_s, self._since_s = now_s - self._since_s, now_s
+        if self.held:
+            return
+        ahead_m, turn_rad = self._twist.linear_m_s * dt_s, self._twist.angular_rad_s * dt_s
+        self.true = moved(self.true, ahead_m, turn_rad)
+        self._told = moved(self._told, ahead_m / self._far, turn_rad / self._much)
+
+
+def moved(pose, ahead_m, turn_rad):
+    x_m, y_m, yaw_rad = pose
+    heading_rad = yaw_rad + turn_rad / 2
+    return x_m + ahead_m * math.cos(heading_rad), y_m + ahead_m * math.sin(heading_rad), yaw_rad + turn_rad
+
+
+@contextmanager
+def devices(folder, room):
+    board = Core2Unit(room.drive, room.measure, Firmware(boot_s=0.05))
+    wires = [Wire(folder / "core2", board), Wire(folder / "rplidar", RplidarUnit(room.distances))]
+    settings = folder / "mine.toml"
+    settings.write_text(QUICK)
+    try:
+        words = ["calibrate", "base", "--base", str(folder / "core2"), "--settings", str(settings)]
+        yield words, ["--lidar", str(folder / "rplidar"), "--yes"], wires
+    finally:
+        for wire in wires:
+            wire.close()
+
+
+def test_with_a_lidar_a_ten_percent_error_is_found_by_itself_and_written(tmp_path, capsys):
+    room = Room(far=1.1, much=1.15)
+    with devices(tmp_path, room) as (words, lidar, _):
+        words = [*words, *lidar, "--distance", "0.5"]  # noqa: PLW2901
+        assert main([*words, "--turns", "0.75"]) == 0, capsys.readouterr().err
+        out = capsys.readouterr().out
+        settings = load_settings(tmp_path / "mine.toml")
+        assert settings.base.distance_scale == pytest.approx(1.1, abs=0.02), out
+        assert settings.base.turn_scale == pytest.approx(1.15, abs=0.015), out
+        assert "distance_scale 1.0000 -> 1." in out
+        assert "# it turns" in (tmp_path / "mine.toml").read_text()
+        assert room.twists[-1] == STOP
+        # With what it has learnt it goes as far as it is told.
+        room.put_back()
+        assert main([*words, "--only", "distance"]) == 0, capsys.readouterr().err
+        assert math.hypot(*room.true[:2]) == pytest.approx(0.5, abs=0.05)
+        assert load_settings(tmp_path / "mine.toml").base.distance_scale == pytest.approx(1.1, abs=0.02)
+
+
+def test_with_a_tape_the_person_says_what_was_measured(tmp_path, capsys, monkeypatch):
+    answers = iter(["y", "far", "0,33"])
+    asked = []
+    monkeypatch.setattr("sys.stdin.isatty", lambda: True, raising=False)
+    monkeypatch.setattr("builtins.input", lambda question: asked.append(question) or next(answers))
+    with devices(tmp_path, Room(far=1.1)) as (words, _, _):
+        words = [*words, *NO_FIELD, "--only", "distance", "--distance", "0.3"]  # noqa: PLW2901
+        assert main(words) == 0, capsys.readouterr().err
+    assert "power switch" in asked[0]
+    reported_m = float(re.search(r"reported (\S+) m", capsys.readouterr().out)[1])
+    assert load_settings(tmp_path / "mine.toml").base.distance_scale == pytest.approx(0.33 / reported_m, abs=0.002)
+
+
+def refused(words, capsys):
+    assert main(words) == 2
+    return capsys.readouterr().err
+
+
+def test_it_refuses_what_is_not_safe_and_writes_nothing(tmp_path, capsys, monkeypatch):
+    room = Room()
+    with devices(tmp_path, room) as (words, lidar, _):
+        assert "nobody is there to ask" in refused([*words, *lidar[:2]], capsys)
+        assert "no --lidar" in refused([*words, "--by", "lidar"], capsys)
+        assert "--distance is" in refused([*words, "--distance", "90", "--yes"], capsys)
+        assert "of 5.55 m" in refused([*words, *lidar, "--distance", "4"], capsys)
+        assert "does not see the way" in refused([*words, "--yes"], capsys)
+        room.held = True
+        assert "wheels do not turn" in refused([*words, *lidar, "--only", "turn"], capsys)
+        monkeypatch.setattr("sim_backend.emulators.core2.VOLTAGE_V", 10.2)
+        assert "battery is at 10.2 V" in refused([*words, *lidar], capsys)
+        with contextlib.closing(Line(words[3], 525000)):
+            assert "in use" in refused([*words, "--yes"], capsys)
+    assert (tmp_path / "mine.toml").read_text() == QUICK
+    assert room.true == (0.0, 0.0, 0.0)
+
+
+def test_whoever_says_no_moves_nothing(tmp_path, capsys, monkeypatch):
+    monkeypatch.setattr("sys.stdin.isatty", lambda: True, raising=False)
+    monkeypatch.setattr("builtins.input", lambda _: "")
+    room = Room()
+    with devices(tmp_path, room) as (words, _, _):
+        assert "Nothing was moved" in refused([*words, *NO_FIELD], capsys)
+    assert set(room.twists) <= {STOP}
+
+
+def test_a_lidar_that_goes_mid_drive_ends_it(tmp_path, capsys):
+    room = Room()
+    with devices(tmp_path, room) as (words, lidar, wires):
+
+        def unplug_on_the_way():
+            while room.true[0] < 0.05:
+                time.sleep(0.01)
+            wires[1].unplug()
+
+        vandal = threading.Thread(target=unplug_on_the_way, daemon=True)
+        vandal.start()
+        error = refused([*words, *lidar, "--only", "distance"], capsys)
+        vandal.join(1.0)
+    assert "the robot stopped" in error
+    assert 0.05 < room.true[0] < 0.3
+    assert room.twists[-1] == STOP
+    assert (tmp_path / "mine.toml").read_text() == QUICK
+
+
+def test_what_cannot_be_true_is_not_written():
+    from tools.calibration import CalibrationError
+
+    with pytest.raises(CalibrationError, match="cannot be right"):
+        calibrate.checked("distance", 1.9)
+    assert calibrate.checked("distance", 1.1) == 1.1
+
+
+def scan_at(x_m, y_m, yaw_rad, beams=400, noise_m=0.005):
+    angles = -math.pi + math.tau / beams * np.arange(beams)
+    ranges = to_walls(x_m, y_m, yaw_rad + angles) + np.random.default_rng(0).normal(0.0, noise_m, beams)
+    return LaserScan(0.0, -math.pi, math.tau / beams, 0.15, 12.0, ranges.astype(np.float32))
+
+
+def test_a_wall_is_found_where_it_is_and_only_if_it_is_flat():
+    assert wall_ahead_m(scan_at(0.0, 0.0, 0.0)) == pytest.approx(3.0, abs=0.005)
+    assert wall_ahead_m(scan_at(1.0, 0.3, 0.1)) == pytest.approx(2.0 / math.cos(0.1), abs=0.01)
+    assert wall_ahead_m(scan_at(0.0, 0.0, 0.55)) is None  # a corner
+    assert wall_ahead_m(scan_at(0.0, 0.0, 0.0, noise_m=0.1)) is None
+
+
+@pytest.mark.parametrize("turn_rad", [math.pi * 1.15, 4 * math.pi * 0.9, math.pi])
+def test_a_turn_is_found_by_the_room_and_not_invented(turn_rad):
+    first, second = scan_at(0.0, 0.0, 0.0), scan_at(0.02, -0.01, turn_rad)
+    found = turn_between(first, second, turn_rad + 0.2, 0.35)
+    assert found == pytest.approx(turn_rad, abs=math.radians(1.0))
+    assert turn_between(first, second, turn_rad + 1.0, 0.35) is None
+    round_room = LaserScan(0.0, -math.pi, math.tau / 400, 0.15, 12.0, np.full(400, 2.0, np.float32))
+    assert turn_between(round_room, round_room, turn_rad, 0.35) is None
+
+
+def test_a_key_is_set_and_every_other_line_kept(tmp_path):
+    assert set_key("", "base", "x", "1") == "[base]\nx = 1\n"
+    assert set_key("[lidar]\nx = 2", "base", "x", "1") == "[lidar]\nx = 2\n\n[base]\nx = 1\n"
+    text = "[base]  # mine\ny = 3\nx = 2.0   # old\n[lidar]\nx = 9\n"
+    assert set_key(text, "base", "x", "1") == text.replace("x = 2.0 ", "x = 1 ")
+    assert set_key("[base]\n[lidar]\nx = 9\n", "base", "x", "1") == "[base]\nx = 1\n[lidar]\nx = 9\n"
+    path = tmp_path / "s.toml"
+    path.write_text('base = { turn_scale = 1.1 }\n')  # fmt: skip
+    with pytest.raises(ConfigError):
+        write_base_setting(path, "turn_scale", 1.2)
+    assert load_settings(path).base.turn_scale == 1.1
