@@ -15,6 +15,7 @@ Style = Literal["bang-bang", "proportional"]
 STAGES_S = (0.4, 0.6, 0.8, 0.8)
 STEERING: dict[Style, tuple[float, ...]] = {"bang-bang": (-1.0, 0.0, 1.0), "proportional": (-1.0, -0.5, 0.0, 0.5, 1.0)}
 COMFORT_M = 0.40  # clearance below which closeness costs
+STAY_COST = 0.05  # of turning otherwise than the last plan: a small one lets full steer settle on the line
 TOUCH_M = 0.03
 
 
@@ -39,7 +40,7 @@ class Planner:
         """Return the first action of the best sequence from `state`."""
         cost = self._cost(state)
         if self._last is not None:  # stay with a plan unless another is clearly better: labels with one mind
-            cost = cost + 0.1 * np.abs(self._sequences[:, 0, 1] - self._last)
+            cost = cost + STAY_COST * np.abs(self._sequences[:, 0, 1] - self._last)
         linear, angular = self._sequences[int(np.argmin(cost)), 0]
         if self._style == "proportional":
             angular = self._blend(cost)
@@ -58,7 +59,7 @@ class Planner:
         cost: NDArray[np.float64] = (
             100.0 * (1.0 - first_hit / steps)
             + 3.0 * (closeness**2).mean(axis=1)
-            + self._follow * ((lateral**2).mean(axis=1) + 0.5 * lateral[:, -1] + 0.3 * heading)
+            + self._follow * (3.0 * (lateral**2).mean(axis=1) + 0.2 * lateral[:, -1] + 0.3 * heading)
             + 0.15 * self._effort
             + 8.0 * self._standing
         )

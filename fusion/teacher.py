@@ -1,7 +1,7 @@
 """The scripted teacher: stands in for the person with the gamepad, faults included.
 
-It sees the simulator's state, looks ahead with the policy that is driving, takes over before a collision or a lost
-line, and hands back once that policy has looked safe for a few steps. When called it reacts sooner.
+It sees the simulator's state, looks ahead with the policy that is driving, takes over before a collision, a lost line
+or a standstill, and hands back once that policy has looked safe for a few steps. When called it reacts sooner.
 """
 
 import math
@@ -30,7 +30,10 @@ class TeacherSettings(Table, frozen=True):
     horizon_s: float = 1.5
     margin_m: float = 0.08  # closer than this to a box is danger
     lateral_m: float = 1.0  # further than this from the line is danger
+    stray_m: float = 0.45  # and so is this where no box is within `free_m`: there is nothing to drive around
+    free_m: float = 1.0
     follow_line: bool = True  # False: only the boxes matter, and to go straight on where there is none
+    stall: Share = 0.3  # a policy that drives less than this share of full speed over the horizon stands in the way
     wander_rad: float = 0.1  # a larger turn within the horizon, without a box in the way, is wrong then
     safe_steps: int = 3
     delay_s: float = 0.6  # median of the log-normal reaction delay
@@ -53,6 +56,7 @@ class ScriptedTeacher:
         self._foresight = foresight
         self._settings = settings
         self._period_s = profile.period_s
+        self._full_speed_m_s = profile.base.max_linear_m_s
         self._steps = math.ceil(settings.horizon_s / profile.period_s)
         self._preprocess = Preprocessor(profile)
         self._planner = Planner(foresight, settings.style, profile.period_s, follow_line=settings.follow_line)
@@ -75,7 +79,7 @@ class ScriptedTeacher:
         """Return the action while it holds the wheel, else None."""
         if policy is None:
             return self._planner.plan(state)  # the initial demonstration: careful and without faults
-        danger = self._danger(state, policy)
+        danger = self._danger(state, proposal, policy)
         if self._driving:
             self._safe = 0 if danger else self._safe + 1
             self._driving = self._safe < self._settings.safe_steps
@@ -85,17 +89,24 @@ class ScriptedTeacher:
             return None
         return self._with_faults(self._planner.plan(state))
 
-    def _danger(self, state: CourseState, policy: Policy) -> bool:
-        """Whether the policy would hit something or lose the line within the horizon, at its full speed."""
-        if self._settings.follow_line and not self._within_reach(state):
+    def _danger(self, state: CourseState, proposal: Proposal, policy: Policy) -> bool:
+        """Whether the policy would hit something, lose the line or stand within the horizon, at its full speed."""
+        slow = proposal.choice.action[0] < self._settings.stall
+        if self._settings.follow_line and not slow and not self._within_reach(state):
             return False
         drive = self._foresight.rollout(state, self._seeing(policy), self._steps, self._period_s)
-        return any(
+        unsafe = any(
             each.collided
             or each.clearance_m < self._settings.margin_m
-            or bool(self._off_line(np.asarray(each.lateral_m)).any())
+            or bool(self._off_line(np.asarray(each.lateral_m), np.asarray(each.clearance_m)))
             for each in drive
-        ) or (not self._settings.follow_line and self._wanders(state, drive))
+        )
+        return unsafe or self._stalls(state, drive) or (not self._settings.follow_line and self._wanders(state, drive))
+
+    def _stalls(self, state: CourseState, drive: list[CourseState]) -> bool:
+        x_m, y_m = np.array([(each.x_m, each.y_m) for each in (state, *drive)]).T
+        driven_m = np.hypot(np.diff(x_m), np.diff(y_m)).sum()
+        return bool(driven_m < self._settings.stall * self._full_speed_m_s * self._period_s * len(drive))
 
     def _wanders(self, state: CourseState, drive: list[CourseState]) -> bool:
         """Whether the policy turns although the way straight ahead is free."""
@@ -113,11 +124,13 @@ class ScriptedTeacher:
         actions[:, :, 1] = turns[:, None]
         futures = self._foresight.imagine(state, actions, self._period_s)
         close = futures.clearance_m < self._settings.margin_m + 0.1
-        far = self._off_line(futures.lateral_m)
+        far = self._off_line(futures.lateral_m, futures.clearance_m)
         return bool(close.any() or far.any())
 
-    def _off_line(self, lateral_m: NDArray[np.float64]) -> NDArray[np.bool_]:
-        return self._settings.follow_line & (np.abs(lateral_m) > self._settings.lateral_m)
+    def _off_line(self, lateral_m: NDArray[np.float64], clearance_m: NDArray[np.float64]) -> NDArray[np.bool_]:
+        settings, off_m = self._settings, np.abs(lateral_m)
+        strayed = (off_m > settings.stray_m) & (clearance_m > settings.free_m)
+        return settings.follow_line & ((off_m > settings.lateral_m) | strayed)
 
     def _seeing(self, policy: Policy) -> Callable[[Observation], Action]:
         def act(observation: Observation) -> Action:

@@ -149,6 +149,6 @@ class Body:
             lateral_m=lateral_m,
             clearance_m=clearance_m,
             collided=was.collided or touched,
-            lost=was.lost or course.lost(lateral_m),
+            lost=was.lost or course.lost(lateral_m, clearance_m),
             finished=was.finished or course.finished(progress_m, was.start_m),
         )

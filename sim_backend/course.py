@@ -81,9 +81,11 @@ class Course:
         error = np.remainder(yaw_rad - heading + math.pi, math.tau) - math.pi
         return Place(progress, lateral, error)
 
-    def lost(self, lateral_m: float) -> bool:
+    def lost(self, lateral_m: float, clearance_m: float) -> bool:
         """Tell whether the line is too far away."""
-        return abs(lateral_m) > self.limits.lost_m
+        limits, off_m = self.limits, abs(lateral_m)
+        strayed = limits.stray_m is not None and off_m > limits.stray_m and clearance_m > limits.free_m
+        return off_m > limits.lost_m or strayed
 
     def finished(self, progress_m: float, start_m: float) -> bool:
         """Tell whether a drive that began at `start_m` is over."""

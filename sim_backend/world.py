@@ -171,11 +171,14 @@ class Area(Table, frozen=True):
 class Limits(Table, frozen=True):
     """When a drive is lost or finished.
 
-    With a line: lost when farther than `lost_m` from it, finished after `laps` of a closed line or at `finish_m`
+    With a line: lost when farther than `lost_m` from it, or, where no box is within `free_m` and there is nothing to
+    drive around, farther than `stray_m`; finished after `laps` of a closed line or at `finish_m`
     along an open one. Without a line both are measured from the straight ahead of the start.
     """
 
     lost_m: Size
+    stray_m: Size | None = None
+    free_m: Size = 1.0
     laps: Few = 1
     finish_m: Size | None = None
 

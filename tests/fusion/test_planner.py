@@ -15,7 +15,7 @@ PROFILE = load_profile("thesis-sim")
 PERIOD_S = PROFILE.period_s
 BOX_M = 4.0
 STYLES = ["bang-bang", "proportional"]
-SWAY_M = {"bang-bang": 0.75, "proportional": 0.15}  # full steer or none weaves along the line
+SWAY_M = {"bang-bang": 0.25, "proportional": 0.12}  # full steer or none weaves along the line
 
 
 def world(*boxes):

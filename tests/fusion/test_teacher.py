@@ -9,7 +9,7 @@ from fusion.control import to_twist
 from fusion.method import Call, Choice, Proposal
 from fusion.preprocess import Features
 from fusion.teacher import PERFECT, SKILLED, ScriptedTeacher, TeacherSettings
-from hal.messages import Command, CourseState
+from hal.messages import Command, CourseState, Episode
 from hal.profile import load_profile
 from sim_backend.foresight import Foresight
 from sim_backend.twin import Twin
@@ -45,7 +45,7 @@ class Crystal:
 
     def rollout(self, state, policy, steps, period_s):
         self.rollouts += 1
-        return [replace(state, collided=self.danger)]
+        return [replace(state, x_m=state.x_m + 0.2, collided=self.danger)]
 
     def imagine(self, state, actions, period_s):
         lateral = 3.0 - np.cumsum(actions[:, :, 1], axis=1) * period_s
@@ -160,6 +160,27 @@ WORLD = World(
     box=(Box(x_m=4.0, y_m=0.05),),
     limits=Limits(lost_m=1.5, finish_m=10.0),
 )
+
+
+@pytest.mark.parametrize(
+    ("lateral_m", "yaw_rad", "policy", "wheel"),
+    [
+        (0.0, 0.0, straight, False),
+        (0.6, 0.0, straight, True),  # beside the line, with nothing to drive around
+        (0.3, 0.0, straight, False),
+        (0.0, 0.0, lambda features: (0.1, 0.0), True),  # nothing will happen to it, and nothing will come of it
+    ],
+)
+def test_a_robot_that_strays_from_a_free_line_or_stands_is_in_need_of_help(lateral_m, yaw_rad, policy, wheel):
+    foresight = Foresight(PROFILE, WORLD)
+    hand = ScriptedTeacher(foresight, PROFILE, PERFECT, seed=0)
+    hand.reset(0)
+    twin = Twin(PROFILE, WORLD)
+    twin.reset(Episode(start_m=0.5, lateral_m=lateral_m, yaw_rad=yaw_rad))
+    proposal = replace(QUIET, choice=Choice("novice", policy(FEATURES)))
+    action = hand.act(twin.state(), proposal, policy)
+    foresight.close()
+    assert (action is not None) == wheel
 
 
 @pytest.mark.parametrize("settings", [PERFECT, SKILLED])

@@ -99,3 +99,13 @@ def test_the_end_of_an_open_and_of_a_closed_course():
     length = eight.layout.curve.length_m
     assert not eight.finished(length, 1.0)
     assert eight.finished(length + 1.0, 1.0)
+
+
+@pytest.mark.parametrize(
+    ("lateral_m", "clearance_m", "lost"),
+    [(0.6, 5.0, False), (-0.8, 5.0, True), (0.8, 0.9, False), (1.6, 0.9, True)],
+)
+def test_what_is_lost_depends_on_whether_there_is_something_to_drive_around(lateral_m, clearance_m, lost):
+    course = Course(build(load_world("line-obstacles")), 0.1)
+    assert course.lost(lateral_m, clearance_m) is lost
+    assert Course(build(load_world("line")), 0.1).lost(lateral_m, clearance_m) is (abs(lateral_m) > 1.5)
