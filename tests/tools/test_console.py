@@ -113,7 +113,7 @@ def test_a_stale_picture_is_not_shown():
 
 
 def test_actions_of_an_old_decision_are_not_shown_and_its_counts_are():
-    bars, counts = pygame.Rect(690, 240, 560, 200), pygame.Rect(576, 580, 60, 40)
+    bars, counts = pygame.Rect(690, 240, 560, 200), pygame.Rect(576, 520, 60, 40)
     fresh, old = picture(VIEW), picture(replace(VIEW, decision_age_s=2.0))
     assert share_of(part(fresh, bars), SKY) > 0.02
     assert share_of(part(old, bars), SKY) == 0.0

@@ -1,5 +1,5 @@
 """The console: what the robot sees, who drives and why, on one screen. It only looks; a slow console slows nobody.
 
-`state` folds what comes over the bus, `palette`, `draw` and `panels` turn it into pictures, `sound` makes the two
+`state` folds what comes over the bus, `draw` and `palette` turn it into pictures, `sound` makes the two
 calls, `keyboard` is the fallback for a pad; the loop is the verb.
 """

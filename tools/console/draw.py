@@ -5,13 +5,10 @@ import math
 import pygame
 
 from hal.messages import Action, ExpertView, LaserScan
-from tools.console.state import LOW_V, STALE_S, View, battery_share, driver_words
+from tools.console.palette import AMBER, BACK, BLUE, DIM, EDGE, GREEN, PANEL, RED, SKY, TEXT, panel, write
+from tools.console.state import LOW_V, STALE_S, View, battery_share, driver_words, operator_words
 
-SIZE = (1280, 720)
-# Okabe and Ito's colours, but a red that is darker than the amber: the colour-blind tell them apart by that, by shape
-# and by words.
-BACK, PANEL, EDGE, TEXT, DIM = (18, 20, 24), (32, 36, 43), (70, 76, 86), (236, 238, 240), (150, 156, 166)
-AMBER, RED, BLUE, GREEN, SKY = (230, 159, 0), (192, 40, 40), (0, 114, 178), (0, 158, 115), (86, 180, 233)
+SIZE = (1280, 720)  # fits a screen of 1366 by 768 with a window's frame
 CALL_WORDS = {
     "attention": ("ATTENTION", "one expert drives: watch it", AMBER, (0, 0, 0)),
     "feedback": ("YOUR DECISION", "experts disagree: take the wheel", RED, (255, 255, 255)),
@@ -26,8 +23,9 @@ def draw(surface: pygame.Surface, view: View) -> None:
     draw_scan(surface, pygame.Rect(16, 358, 528, 298), view)
     draw_driver(surface, pygame.Rect(560, 16, 704, 80), view)
     draw_call(surface, BANNER, view.call)
-    draw_actions(surface, pygame.Rect(560, 204, 704, 330), view)
-    draw_counts(surface, pygame.Rect(560, 546, 704, 110), view)
+    draw_actions(surface, pygame.Rect(560, 204, 704, 276), view)
+    draw_counts(surface, pygame.Rect(560, 490, 704, 98), view)
+    draw_operator(surface, pygame.Rect(560, 598, 704, 58), view)
     draw_status(surface, pygame.Rect(16, 668, 1248, 40), view)
 
 
@@ -87,7 +85,7 @@ def fan(
 def draw_driver(surface: pygame.Surface, box: pygame.Rect, view: View) -> None:
     """Who drives, and why."""
     who, why = driver_words(view)
-    colour = RED if view.estop or who == "NO LINK" else BLUE if who == "HUMAN" else GREEN
+    colour = RED if view.estop or who == "NO LINK" else BLUE if who == "HUMAN" else AMBER if view.paused else GREEN
     pygame.draw.rect(surface, PANEL, box, border_radius=6)
     pygame.draw.rect(surface, colour, (box.x, box.y, 10, box.height), border_radius=4)
     write(surface, who, (box.x + 26, box.y + 10), 46, TEXT)
@@ -174,8 +172,22 @@ def draw_counts(surface: pygame.Surface, box: pygame.Rect, view: View) -> None:
     )
     for index, (name, count) in enumerate(pairs):
         x = box.x + 16 + index * (box.width - 20) // len(pairs)
-        write(surface, str(count), (x, box.y + 36), 42, TEXT)
-        write(surface, name, (x, box.y + 78), 20, DIM)
+        write(surface, str(count), (x, box.y + 32), 42, TEXT)
+        write(surface, name, (x, box.y + 72), 20, DIM)
+
+
+def draw_operator(surface: pygame.Surface, box: pygame.Rect, view: View) -> None:
+    """What became of the newest request, and which keys ask."""
+    pygame.draw.rect(surface, PANEL, box, border_radius=6)
+    words, accepted = operator_words(view)
+    colour = DIM if accepted is None else GREEN if accepted else RED
+    pygame.draw.rect(surface, colour, (box.x, box.y, 10, box.height), border_radius=4)
+    verdict = "" if accepted is None else "done: " if accepted else "no: "
+    write(surface, verdict + words, (box.x + 26, box.y + 9), 24, DIM if accepted is None else TEXT)
+    names = () if view.decision is None else (expert.name for expert in view.decision.experts)
+    keys = ["P " + ("go on" if view.paused else "pause"), "S save", "R held: new episode"]
+    keys += [f"{number} {name} drives" for number, name in enumerate(names, start=1)]
+    write(surface, "    ".join(keys), (box.x + 26, box.y + 34), 20, DIM)
 
 
 def draw_status(surface: pygame.Surface, box: pygame.Rect, view: View) -> None:
@@ -200,31 +212,3 @@ def draw_status(surface: pygame.Surface, box: pygame.Rect, view: View) -> None:
     x = box.x + 14
     for words, colour in parts:
         x += write(surface, words, (x, box.y + 11), 26, colour) + 30
-
-
-def panel(surface: pygame.Surface, box: pygame.Rect, title: str) -> None:
-    """A titled box."""
-    pygame.draw.rect(surface, PANEL, box, border_radius=6)
-    write(surface, title, (box.x + 10, box.y + 8), 22, DIM)
-
-
-def write(
-    surface: pygame.Surface,
-    words: str,
-    at: tuple[int, int],
-    size: int,
-    colour: tuple[int, int, int],
-    *,
-    centre: bool = False,
-) -> int:
-    """Write a line and return its width in pixels."""
-    if not words:
-        return 0
-    if size not in _FONTS:
-        _FONTS[size] = pygame.font.Font(None, size)
-    image = _FONTS[size].render(words, True, colour)
-    surface.blit(image, image.get_rect(center=at) if centre else image.get_rect(topleft=at))
-    return image.get_width()
-
-
-_FONTS: dict[int, pygame.font.Font] = {}

@@ -11,7 +11,7 @@ import numpy as np
 from hal.bus import Bus, Received
 from hal.messages import ByteArray, CompressedImage, Reason
 from hal.profile import RobotProfile
-from hal.topics import APPLIED, BATTERY, CAMERA, DECISION, ODOM, SCAN
+from hal.topics import APPLIED, BATTERY, CAMERA, DECISION, ODOM, OPERATOR_ANSWER, SCAN
 from tools.console.state import View
 
 M = TypeVar("M")
@@ -24,6 +24,7 @@ class Ears:
         self._scan, self._camera = watch.reader(SCAN), watch.reader(CAMERA)
         self._odom, self._applied = watch.reader(ODOM), watch.reader(APPLIED)
         self._decision, self._battery = watch.reader(DECISION), watch.reader(BATTERY)
+        self._answer = watch.reader(OPERATOR_ANSWER)
         self._picture: ByteArray | None = None
         self._picture_s = -math.inf
         features, base = profile.features, profile.base
@@ -37,7 +38,7 @@ class Ears:
     def look(self) -> View:
         """The view now."""
         scan, odom, applied = self._scan.newest(), self._odom.newest(), self._applied.newest()
-        decision, battery = self._decision.newest(), self._battery.newest()
+        decision, battery, answer = self._decision.newest(), self._battery.newest(), self._answer.newest()
         for received in self._camera.poll()[-1:]:
             self._picture, self._picture_s = decode_picture(received.message), received.arrived_s
         now_s = time.monotonic()
@@ -53,6 +54,8 @@ class Ears:
             decision=_message(decision),
             decision_age_s=_age_s(decision, now_s),
             battery=_message(battery),
+            answer=_message(answer),
+            answer_age_s=_age_s(answer, now_s),
             estop=applied is not None and applied.message.reason is Reason.ESTOP,
         )
 

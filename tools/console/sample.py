@@ -2,7 +2,19 @@
 
 import math
 
-from hal.messages import Applied, BatteryState, Decision, Episode, ExpertView, Image, LabelCounts, Reason, Source, Twist
+from hal.messages import (
+    Applied,
+    BatteryState,
+    Decision,
+    Episode,
+    ExpertView,
+    Image,
+    LabelCounts,
+    OperatorAnswer,
+    Reason,
+    Source,
+    Twist,
+)
 from hal.profile import load_profile
 from tools.console.state import View
 
@@ -45,6 +57,8 @@ def sample_view() -> View:
         decision=decision,
         decision_age_s=0.1,
         battery=BatteryState(seen.stamp_s, 11.9),
+        answer=OperatorAnswer(seen.stamp_s, count=1, words="saved 139 labels and the novice after 4 training steps"),
+        answer_age_s=0.1,
         fov_rad=min(profile.features.fov_rad, 2 * math.pi),
         max_range_m=profile.features.max_range_m,
     )

@@ -9,7 +9,10 @@ from hal.messages import (
     Decision,
     LaserScan,
     Odometry,
+    OperatorAnswer,
+    Request,
 )
+from hal.topics import OPERATOR_ANSWER
 from tools.joystick.hand import State
 
 STALE_S = 1.0
@@ -20,7 +23,8 @@ EMPTY_V, LOW_V, FULL_V = 10.2, 10.8, 12.6  # three lithium cells
 class View:
     """What is known now. A part is None until it was heard; ages are in seconds since it was.
 
-    `camera` is RGB, uint8 [height, width, 3]. `hand` is the keyboard's, None without one.
+    `camera` is RGB, uint8 [height, width, 3]. `hand` is the keyboard's, None without one. `answer` is whoever's who
+    drives and learns; `unanswered` is the keyboard's request that nobody answered.
     """
 
     robot: str
@@ -34,6 +38,9 @@ class View:
     decision: Decision | None = None
     decision_age_s: float = float("inf")
     battery: BatteryState | None = None
+    answer: OperatorAnswer | None = None
+    answer_age_s: float = float("inf")
+    unanswered: Request | None = None
     estop: bool = False
     hand: State | None = None
     fov_rad: float = 2.269
@@ -44,6 +51,16 @@ class View:
     def deciding(self) -> Decision | None:
         """The decision that holds now: None if nobody decides any more. Its counts outlive it."""
         return self.decision if self.decision_age_s < STALE_S else None
+
+    @property
+    def answering(self) -> OperatorAnswer | None:
+        """The newest answer if somebody still takes requests."""
+        return self.answer if self.answer_age_s <= OPERATOR_ANSWER.max_age_s else None
+
+    @property
+    def paused(self) -> bool:
+        """Whether driving and learning wait for a person."""
+        return self.answering is not None and self.answering.paused
 
     @property
     def call(self) -> str:
@@ -58,7 +75,9 @@ def driver_words(view: View) -> tuple[str, str]:
     if view.applied is None or view.link_age_s > STALE_S:
         return "NO LINK", "the robot has not been heard; it stops by itself"
     if view.applied.source == "teleop":
-        return "HUMAN", "the dead-man is held"
+        return "HUMAN", "the dead-man is held" + ("; paused: nothing is learned" if view.paused else "")
+    if view.paused:
+        return "PAUSED", "it stands and learns nothing; P, or square on the pad, goes on"
     if view.applied.source == "none":
         return "STANDS", REASONS.get(view.applied.reason, view.applied.reason)
     return policy_words(view.deciding)
@@ -73,6 +92,17 @@ REASONS = {
     "obstacle": "something is in the way",
     "ok": "told to stand",
 }
+
+
+def operator_words(view: View) -> tuple[str, bool | None]:
+    """What became of the newest request in a few words, and whether it was done; None if there was none."""
+    if view.unanswered is not None:
+        return f"nobody answers to '{view.unanswered}': does lira fusion run?", False
+    if view.answering is None:
+        return "nobody takes requests: start lira fusion", None
+    if not view.answering.count:
+        return "no request yet", None
+    return view.answering.words, view.answering.accepted
 
 
 def policy_words(decision: Decision | None) -> tuple[str, str]:

@@ -8,11 +8,14 @@ from dataclasses import replace
 
 import pygame
 
+from hal.messages import Request
 from tools.console import sound
 from tools.console.draw import SIZE, draw
 from tools.console.keyboard import keyboard_mapping, pad_of
 from tools.console.state import View
 from tools.joystick.hand import Hand, State
+from tools.joystick.requests import RequestButtons
+from tools.joystick.stick import PadState
 from tools.joystick.wheel import Wheel
 
 FPS = 30.0
@@ -25,15 +28,27 @@ KEYS = {
     pygame.K_DOWN: "down",
     pygame.K_LEFT: "left",
     pygame.K_RIGHT: "right",
+    pygame.K_p: "p",
+    pygame.K_s: "s",
+    pygame.K_r: "r",
+    pygame.K_1: "1",
+    pygame.K_2: "2",
+    pygame.K_3: "3",
+    pygame.K_4: "4",
 }
 
 
 class Keyboard:
-    """The keyboard's hand on the wheel; a window without the focus is a pad that is lost."""
+    """The keyboard's hand on the wheel, and what it asks; a window without the focus is a pad that is lost.
+
+    `unanswered` is the newest request if nobody answered it.
+    """
 
     def __init__(self, wheel: Wheel) -> None:
         self._wheel = wheel
         self._hand = Hand(keyboard_mapping())
+        self._buttons = RequestButtons(keyboard_mapping())
+        self.unanswered: Request | None = None
 
     @property
     def state(self) -> State:
@@ -44,11 +59,22 @@ class Keyboard:
         """Send what the keys order; None without the focus."""
         self._wheel.listen()
         now_s = time.monotonic()
-        order = self._hand.update(None if pressed is None else pad_of(pressed), now_s)
+        pad = None if pressed is None else pad_of(pressed)
+        order = self._hand.update(pad, now_s)
         if order.estop is not None:
             self._wheel.estop(order.estop)
         if order.action is not None:
             self._wheel.drive(order.action, order.released, now_s)
+        self._ask(pad, now_s)
+
+    def _ask(self, pad: PadState | None, now_s: float) -> None:
+        self._wheel.decisions()
+        if self._wheel.answers():
+            self.unanswered = None
+        for request in self._buttons.update(pad, now_s, paused=self._wheel.paused, experts=self._wheel.experts):
+            self._wheel.ask(request, now_s)
+            self.unanswered = None
+        self.unanswered = self._wheel.unanswered(now_s) or self.unanswered
 
 
 def save_picture(view: View, path: str) -> None:
@@ -83,7 +109,9 @@ def show(look: Callable[[], View], keyboard: Keyboard | None, stop: threading.Ev
             pressed = pressed if focused else frozenset()
             if keyboard is not None:
                 keyboard.update(pressed if focused else None)
-            view = replace(look(), hand=None if keyboard is None else keyboard.state)
+            view = look()
+            if keyboard is not None:
+                view = replace(view, hand=keyboard.state, unanswered=keyboard.unanswered)
             if view.call != call and view.call in sounds:
                 sounds[view.call].play()
             call = view.call

@@ -1,7 +1,8 @@
 """Watch the robot learn: camera, scan, every expert's action and activation, who drives and why, and its calls.
 
 It only looks, in a process of its own: closing it changes nothing. Without a gamepad the keyboard drives: hold SPACE
-and use the arrows (SHIFT: full speed), Esc is the emergency stop, F1 held for a second releases it.
+and use the arrows (SHIFT: full speed), Esc is the emergency stop, F1 held for a second releases it. P pauses driving
+and learning and goes on, S saves, R held for a second begins a new episode, 1 to 4 give the wheel to an expert.
 
 examples:
   lira console
