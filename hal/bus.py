@@ -135,7 +135,8 @@ class Bus:
 
     Peers hear the robot, not one another. With `watch` a session hears what all of them say, through the robot and
     over one link: for consoles and the like, not for driving; nobody there to connect to is a `BusError` then.
-    `refusals` is what counts those whom keys keep out, for whoever reports it.
+    `refusals` is what counts those whom keys keep out, for whoever reports it. `prefix` is what keys begin with instead
+    of the name, for a robot that is not ours; it may be empty.
 
     Raises `BusError` if the port is taken, `ConfigError` for a bad name, endpoint or keys.
     """
@@ -150,10 +151,12 @@ class Bus:
         insecure: bool = False,
         watch: bool = False,
         refusals: Refusals | None = None,
+        prefix: str | None = None,
     ) -> None:
         if not re.fullmatch(r"[A-Za-z][A-Za-z0-9_]*", robot):
             raise ConfigError(f"'{robot}' is no name for a robot", "Use letters, digits and underscores, as in ROS.")
         self.robot = robot
+        self._prefix = robot if prefix is None else prefix
         self.endpoint = listen or connect or ""
         self.epoch = secrets.randbits(64)
         self.refusals = refusals or Refusals()
@@ -274,7 +277,7 @@ class Bus:
         return not closer.is_alive()
 
     def _key(self, key: str) -> str:
-        return f"{self.robot}/{key}"
+        return f"{self._prefix}/{key}" if self._prefix else key
 
 
 def _open(robot: str, listen: str | None, connect: str | None, keys: Keys | None, watch: bool) -> zenoh.Session:
