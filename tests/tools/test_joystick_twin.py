@@ -1,13 +1,16 @@
 """A person on the twin: with nothing else running, and teaching the learner; and how soon a press takes the wheel."""
 
+import signal
 import time
 
 import pytest
 from pad_bed import SONY, Bed, library
 
+from fusion.demonstrations import read_demonstrations
+from fusion.record import RunRecord, StepRecord, read_run
 from hal.bus import Bus
 from hal.messages import STOP, Source
-from hal.topics import APPLIED, DECISION, SIM_STATE
+from hal.topics import APPLIED, DECISION, OPERATOR_ANSWER, SIM_STATE
 from tools.bench import takeover
 from tools.processes import ChildProcess, free_port, lira_command
 
@@ -80,23 +83,101 @@ def test_twin_and_joystick_drive_with_nothing_else_running(bed, hand, watch):
     newest(state, lambda s: abs(s.linear_m_s) < 0.01)
 
 
-def test_a_press_takes_the_wheel_from_the_learner_which_labels_it(bed, hand, watch, address, tmp_path):
-    words = ("--method", "lira", "--run", str(tmp_path / "run"))
-    command = lira_command("fusion", "--name", address[0], "--connect", address[1], *words)
-    with ChildProcess("the learner", command, tmp_path / "fusion.log"):
+def learner(address, tmp_path, *words):
+    command = lira_command("fusion", "--name", address[0], "--connect", address[1], "--run", str(tmp_path / "run"))
+    return ChildProcess("the learner", [*command, *words], tmp_path / "fusion.log")
+
+
+@pytest.mark.parametrize("method", ["lira", "hg-dagger"])
+def test_a_press_takes_the_wheel_from_the_learner_which_labels_it(bed, hand, watch, address, tmp_path, method):
+    with learner(address, tmp_path, "--method", method, "--idle-frames", "skip") as process:
         decisions, applied = watch.reader(DECISION), watch.reader(APPLIED)
-        assert newest(decisions, lambda d: d.experts, READY_S).labels.demonstration == 0
+        decision = newest(decisions, lambda d: d.driver == "human", READY_S)
+        assert [expert.name for expert in decision.experts] == (["camera", "lidar"] if method == "lira" else [])
+        assert decision.labels.demonstration == 0
         bed.key(PAD, "BTN_TL", 1)
         hand.wait_ready("you drive", 10.0)
         newest(applied, lambda a: a.source is Source.TELEOP)
         bed.axis(PAD, "ABS_Y", 0)
-        # Before the first training step the human demonstrates, from the press on: at first with the stick centred.
+        # Before the first training step the human demonstrates.
         decision = newest(decisions, lambda d: d.labels.demonstration >= 1 and d.human is not None and d.human[0] > 0.1)
         assert decision.driver == "human"
         assert decision.human == pytest.approx((0.5, 0.0), abs=0.01)
         assert newest(applied, lambda a: a.source is Source.TELEOP).twist.linear_m_s > 0.0
+        # It learns while the hand drives, until it can drive by itself.
+        newest(decisions, lambda d: d.training_steps >= 1)
         bed.key(PAD, "BTN_TL", 0)
         newest(applied, lambda a: a.source is not Source.TELEOP)
+        assert newest(decisions, lambda d: d.driver != "human").training_steps >= 1
+        process.signal(signal.SIGINT)
+        assert process.wait(30.0) == 0, process.output()
+        assert "saved" in process.output()
+    demonstrations = list(read_demonstrations(tmp_path / "run" / "labels.lira"))
+    by_hand = [d.action for d in demonstrations if d.source == "human"]
+    assert by_hand == [pytest.approx((0.5, 0.0), abs=0.02)] * len(by_hand)  # without the frames before the stick moved
+    head = next(read_run(tmp_path / "run" / "run.jsonl"))
+    assert isinstance(head, RunRecord)
+    assert (head.world, head.method, head.idle_frames) == ("line", method, "skip")
+    assert (tmp_path / "run" / "novice.safetensors").is_file()
+
+
+def press(bed, name, held_s=0.1):
+    bed.key(PAD, name, 1)
+    time.sleep(held_s)
+    bed.key(PAD, name, 0)
+
+
+def test_a_person_pauses_saves_chooses_and_begins_anew_with_the_pad(bed, hand, watch, address, tmp_path):
+    labels = tmp_path / "run" / "labels.lira"
+    decisions, applied = watch.reader(DECISION), watch.reader(APPLIED, depth=64)
+    state, answers = watch.reader(SIM_STATE), watch.reader(OPERATOR_ANSWER)
+    with learner(address, tmp_path, "--method", "lira", "--start", "experts") as process:
+        newest(state, lambda s: s.progress_m > 1.0, READY_S)
+
+        press(bed, "BTN_WEST")
+        answer = newest(answers, lambda a: a.paused)
+        assert (answer.count, answer.accepted) == (1, True)
+        hand.wait_ready("learner: paused: the robot stands", 10.0)
+        process.wait_ready("operator: paused: the robot stands", 10.0)
+        newest(applied, lambda a: a.source is Source.POLICY and a.twist == STOP)
+        newest(state, lambda s: abs(s.linear_m_s) < 0.01)
+        # The hand still drives, and is not learned from.
+        size = labels.stat().st_size
+        bed.key(PAD, "BTN_TL", 1)
+        hand.wait_ready("you drive", 10.0)
+        bed.axis(PAD, "ABS_Y", 0)
+        newest(state, lambda s: s.linear_m_s > 0.3)
+        bed.axis(PAD, "ABS_Y", 128)
+        bed.key(PAD, "BTN_TL", 0)
+        newest(applied, lambda a: a.source is Source.POLICY and a.twist == STOP)
+        assert labels.stat().st_size == size
+        applied.poll()
+
+        press(bed, "BTN_WEST")
+        newest(answers, lambda a: a.count == 2 and not a.paused)
+        results = [received.message for received in applied.poll()]
+        newest(applied, lambda a: a.source is Source.POLICY and a.twist != STOP)
+        results += [received.message for received in applied.poll()]
+        assert results[0].twist == STOP  # neutral came first
+        assert newest(decisions, lambda d: d.driver == "mean").lap == 0
+
+        press(bed, "BTN_DPAD_RIGHT")
+        answer = newest(answers, lambda a: a.count == 3)
+        assert (answer.accepted, answer.words) == (False, "this method gives no expert the wheel")
+
+        press(bed, "BTN_NORTH")
+        assert newest(answers, lambda a: a.count == 4).words.startswith("saved ")
+        process.wait_ready("operator: saved", 10.0)
+        assert labels.stat().st_size > size
+
+        press(bed, "BTN_EAST", held_s=1.3)
+        assert newest(answers, lambda a: a.count == 5).words == "episode 1 begins, back at the start"
+        assert newest(state, lambda s: s.progress_m < 0.5).progress_m >= 0.0
+        newest(applied, lambda a: a.source is Source.POLICY and a.twist != STOP)
+        newest(decisions, lambda d: d.lap == 1)
+    steps = [record for record in read_run(tmp_path / "run" / "run.jsonl") if isinstance(record, StepRecord)]
+    assert [step.decision.lap for step in steps] == sorted(step.decision.lap for step in steps)
+    assert {d.lap for d in read_demonstrations(labels)} == {0, 1}
 
 
 def test_takeover_is_measured(monkeypatch):
