@@ -32,6 +32,10 @@ class Line:
             raise _why_not(url, error) from error
         self.has_baud = "://" not in url
 
+    def fileno(self) -> int:
+        """Its descriptor, for another process to share."""
+        return int(self._port.fileno())
+
     def set_baud(self, baud: int) -> None:
         """Change the speed. Raises `DeviceError` if the port cannot."""
         try:

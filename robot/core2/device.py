@@ -11,6 +11,7 @@ from hal.errors import DeviceError
 from hal.messages import STOP, Twist
 from robot.core2 import messages
 from robot.core2.board import FIRMWARE, Board, Readings
+from robot.core2.guard import Guard
 from robot.core2.rosserial import ASK_TOPICS, encode_frame, parse_frames
 from robot.line import Line
 from robot.settings import BaseSettings
@@ -26,6 +27,7 @@ SILENCE_S = 1.0  # then it may have been reset, and knows us no more
 LOST_S = 10.0
 POWER = "Check its power switch, and that the path is the base's."
 BRAKE_S = 0.3  # a wheel without power rolls on: the firmware's ramp brakes it before the power is cut
+HELD_S = 0.1  # after the guard has struck: time for the governor to see it, which then waits for a neutral command
 FAREWELL = 3  # zeros, in case one gets lost
 
 
@@ -58,6 +60,8 @@ class Core2:
         self._power_until_s = -math.inf
         self._motors_told: bool | None = None
         self._answers = False
+        self._guard: Guard | None = None
+        self._held_until_s = -math.inf
         self.baud: int | None = None
         self.counts = Counts()
 
@@ -68,8 +72,8 @@ class Core2:
 
     @property
     def answers(self) -> bool:
-        """Whether the board is heard and can be driven now; false while it restarts."""
-        return self._answers
+        """Whether the board is heard and can be driven now; false while it restarts, or just after its guard struck."""
+        return self._answers and time.monotonic() >= self._held_until_s
 
     def drive(self, twist: Twist) -> None:
         """Set the velocity from now on. Raises `ValueError` for what is not finite: the board would obey it."""
@@ -98,6 +102,7 @@ class Core2:
             self._serve(line, buffer, stop, begin)
         finally:
             self._answers = False
+            self._dismiss_guard()
             self._say_farewell(line)
             line.close()
 
@@ -134,6 +139,7 @@ class Core2:
             if now_s - heard_s > LOST_S:
                 raise DeviceError(f"the base board at {self._url} fell silent", POWER)
             if now_s - heard_s > SILENCE_S:
+                self._dismiss_guard()  # what it would write the board may have forgotten
                 board.forget()
                 learning_s = now_s
             if not board.ready:
@@ -144,7 +150,7 @@ class Core2:
                     asked_s = now_s
                     line.write(ASK_TOPICS)
             elif not self._answers:
-                self._begin()
+                self._begin(line)
                 due_s = now_s
                 if not begun:
                     begin()
@@ -164,29 +170,43 @@ class Core2:
             line.write(answer)
         return buffer[parsed.consumed :], bool(parsed.frames)
 
-    def _begin(self) -> None:
-        """The board is ready: its watchdog on, its motors as they shall be."""
+    def _begin(self, line: Line) -> None:
+        """The board is ready: a guard beside it, its watchdog on, its motors as they shall be."""
+        self._dismiss_guard()
+        self._guard = Guard(line.fileno(), self._frame_of(STOP))
         self.counts.negotiations += 1
         self._board.configure("EWCH", "1")
         self._motors_told = None
         self._answers = True
 
+    def _dismiss_guard(self) -> None:
+        if self._guard is not None:
+            self._guard.close()
+            self._guard = None
+
     def _tell(self, line: Line, now_s: float) -> None:
         """Send what is wanted now."""
         self._news.clear()
+        assert self._guard is not None
+        if self._guard.tell():
+            self._held_until_s = now_s + HELD_S
         with self._lock:
             off, braked = self._motors_off, now_s >= self._power_until_s
-            twist = self._twist if now_s <= self._until_s and not off else STOP
-        assert self._board.cmd_vel is not None
-        line.write(encode_frame(self._board.cmd_vel, messages.encode_twist(twist)))
+            held = off or now_s < self._held_until_s
+            twist = self._twist if now_s <= self._until_s and not held else STOP
+        line.write(self._frame_of(twist))
         self.counts.commands += 1
         if self._motors_told is not off and (braked or not off):
             self._motors_told = off
             self._board.configure("EMOT", "0" if off else "1")
+
+    def _frame_of(self, twist: Twist) -> bytes:
+        assert self._board.cmd_vel is not None
+        return encode_frame(self._board.cmd_vel, messages.encode_twist(twist))
 
     def _say_farewell(self, line: Line) -> None:
         """Leave the wheels at zero, as far as the board can be reached."""
         if self._board.cmd_vel is None:
             return
         with contextlib.suppress(DeviceError):
-            line.write(FAREWELL * encode_frame(self._board.cmd_vel, messages.encode_twist(STOP)))
+            line.write(FAREWELL * self._frame_of(STOP))

@@ -1,0 +1,130 @@
+"""Whatever stops the driver's process, the board is told to stand long before its own watchdog would strike."""
+
+import signal
+import subprocess
+import sys
+import time
+
+import pytest
+
+from hal.errors import DeviceError
+from hal.messages import STOP, Odometry, Twist
+from robot.core2.device import Core2
+from robot.core2.guard import Guard
+from robot.keeper import Keeper
+from robot.settings import BaseSettings
+from sim_backend.emulators.core2 import WATCHDOG_S, Core2Unit, Firmware
+from sim_backend.emulators.wire import Wire
+
+GO = Twist(0.2, 0.0)
+SOON_S = 0.35
+DRIVER = """
+import sys, time
+from hal.messages import Twist
+from robot.core2.device import Core2
+from robot.keeper import Keeper
+from robot.settings import BaseSettings
+base = Core2(sys.argv[1], BaseSettings(boot_s=0.15), 0.3)
+keeper = Keeper("base", base.session)
+keeper.start()
+while True:
+    base.drive(Twist(0.2, 0.0))
+    time.sleep(0.02)
+"""
+
+
+class Board:
+    """A board on a wire, and when its wheels were last given what."""
+
+    def __init__(self, path):
+        self.given = [(0.0, STOP)]
+        self.unit = Core2Unit(self.drive, lambda: Odometry(0.0, 0.0, 0.0, 0.0, 0.0, 0.0), Firmware(boot_s=0.1))
+        self.wire = Wire(path, self.unit)
+
+    def drive(self, twist):
+        if twist != self.given[-1][1]:
+            self.given.append((time.monotonic(), twist))
+
+    def wait_for(self, twist, timeout_s=8.0):
+        until_s = time.monotonic() + timeout_s
+        while self.given[-1][1] != twist:
+            assert time.monotonic() < until_s, self.given
+            time.sleep(0.005)
+        return self.given[-1][0]
+
+
+@pytest.fixture
+def board(tmp_path):
+    board = Board(tmp_path / "core2")
+    yield board
+    board.wire.close()
+
+
+@pytest.fixture
+def driver(board, tmp_path):
+    process = subprocess.Popen([sys.executable, "-c", DRIVER, str(tmp_path / "core2")])
+    board.wait_for(GO)
+    time.sleep(0.3)
+    yield process
+    process.kill()
+    process.wait()
+
+
+@pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGSTOP])
+def test_a_driver_that_is_killed_or_frozen_stops_at_once(board, driver, number):
+    assert SOON_S < WATCHDOG_S / 2
+    driver.send_signal(number)
+    struck_s = time.monotonic()
+    assert board.wait_for(STOP) - struck_s < SOON_S
+    assert not board.unit.crashed
+
+
+def test_the_guard_ends_with_its_driver(board, driver):
+    guards = children(driver.pid)
+    assert len(guards) == 1
+    driver.kill()
+    board.wait_for(STOP)
+    until_s = time.monotonic() + 3.0
+    while any(is_alive(pid) for pid in guards):
+        assert time.monotonic() < until_s
+        time.sleep(0.02)
+
+
+def children(pid):
+    listed = subprocess.run(["ps", "-o", "pid=", "--ppid", str(pid)], capture_output=True, text=True, check=True)
+    return [int(word) for word in listed.stdout.split()]
+
+
+def is_alive(pid):
+    listed = subprocess.run(["ps", "-o", "stat=", "-p", str(pid)], capture_output=True, text=True, check=False)
+    return bool(listed.stdout.strip()) and not listed.stdout.startswith("Z")
+
+
+def test_who_was_thawed_does_not_answer_for_a_moment_so_that_the_governor_waits_for_zero(board, tmp_path):
+    base = Core2(str(tmp_path / "core2"), BaseSettings(boot_s=0.15), 5.0)
+    keeper = Keeper("base", base.session)
+    keeper.start()
+    try:
+        keeper.wait_alive(8.0)
+        base.drive(GO)
+        board.wait_for(GO)
+        told, base._guard.tell = base._guard.tell, lambda: False  # alive, but it says nothing
+        stood_s = board.wait_for(STOP, 1.0)
+        base._guard.tell = told
+        until_s = time.monotonic() + 1.0
+        while base.answers:
+            assert time.monotonic() < until_s
+        assert board.wait_for(GO, 2.0) - stood_s > 0.05
+    finally:
+        keeper.close()
+
+
+def test_nobody_drives_without_a_guard(tmp_path):
+    with (tmp_path / "line").open("wb") as line:
+        guard = Guard(line.fileno(), b"\x01")
+        assert guard.tell() is False
+        guard._process.kill()
+        guard._process.wait()
+        with pytest.raises(DeviceError, match="guard"):
+            guard.tell()
+        guard.close()
