@@ -19,17 +19,21 @@ from hal.messages import (
     ExpertView,
     LabelCounts,
     LaserScan,
+    OperatorAnswer,
+    OperatorRequest,
     Reason,
+    Request,
     Source,
     Twist,
 )
-from hal.topics import APPLIED, INFO
+from hal.profile import load_profile
+from hal.topics import APPLIED, INFO, OPERATOR, OPERATOR_ANSWER
 from tools.bench import null_robot
 from tools.bench.takeover import policy
 from tools.console import sound
 from tools.console.keyboard import keyboard_mapping, pad_of
-from tools.console.listen import decode_picture
-from tools.console.state import View, battery_share, driver_words
+from tools.console.listen import Ears, decode_picture
+from tools.console.state import View, battery_share, driver_words, operator_words
 from tools.joystick.stick import action_of
 from tools.joystick.wheel import Wheel
 from tools.processes import ChildProcess, free_port, lira_command
@@ -37,7 +41,8 @@ from tools.processes import ChildProcess, free_port, lira_command
 os.environ["SDL_VIDEODRIVER"] = os.environ["SDL_AUDIODRIVER"] = "dummy"
 
 pygame = pytest.importorskip("pygame", reason="needs pygame: pip install 'lira-rosbot[console]'")
-from tools.console.draw import AMBER, BANNER, RED, SIZE, SKY, draw, fan  # noqa: E402
+from tools.console.draw import BANNER, SIZE, draw, fan  # noqa: E402
+from tools.console.palette import AMBER, GREEN, RED, SKY  # noqa: E402
 from tools.console.window import Keyboard  # noqa: E402
 
 SCAN = LaserScan(1.0, -math.pi / 2, math.pi / 4, 0.1, 4.0, np.array([1.0, math.inf, 2.0, math.nan, 1.0], np.float32))
@@ -149,6 +154,27 @@ def test_who_drives_is_said(view, words):
     assert driver_words(view)[0] == words
 
 
+PAUSED = replace(VIEW, answer=OperatorAnswer(1.0, paused=True, count=2, words="paused"), answer_age_s=0.1)
+
+
+def test_a_pause_is_shown_until_nobody_says_so_any_more():
+    assert driver_words(PAUSED)[0] == "PAUSED"
+    assert driver_words(replace(PAUSED, estop=True))[0] == "EMERGENCY STOP"
+    by_hand = replace(PAUSED, applied=replace(APPLIED_NOW, source=Source.TELEOP))
+    assert driver_words(by_hand) == ("HUMAN", "the dead-man is held; paused: nothing is learned")
+    assert driver_words(replace(PAUSED, answer_age_s=9.0))[0] == "EXPERT CAMERA"
+
+
+def test_an_answer_is_shown_with_its_verdict():
+    refused = replace(PAUSED, answer=replace(PAUSED.answer, accepted=False))
+    assert operator_words(VIEW) == ("nobody takes requests: start lira fusion", None)
+    assert operator_words(replace(VIEW, answer=OperatorAnswer(1.0), answer_age_s=0.1))[1] is None
+    assert (operator_words(PAUSED), operator_words(refused)) == (("paused", True), ("paused", False))
+    edge = pygame.Rect(560, 604, 9, 46)
+    colours = [share_of(part(picture(view), edge), colour) for view, colour in ((PAUSED, GREEN), (refused, RED))]
+    assert min(colours) > 0.9
+
+
 def test_every_reason_has_words():
     for reason in Reason:
         view = replace(VIEW, applied=Applied(STOP, 1.0, Source.NONE, reason))
@@ -181,34 +207,101 @@ def test_a_truncated_picture_is_none():
     assert decode_picture(CompressedImage(0.0, b"\xff\xd8 no picture")) is None
 
 
-def test_a_console_that_is_stopped_or_killed_changes_nothing_in_control(tmp_path):
+SLOW = """
+import sys, time
+from tools.cli import main
+from tools.console import window
+draw = window.draw
+window.draw = lambda *words: (time.sleep(0.3), draw(*words))
+sys.exit(main(sys.argv[1:]))
+"""
+
+
+@contextlib.contextmanager
+def null_robot_on_the_bus(tmp_path):
     name, endpoint = f"console{os.getpid()}", f"127.0.0.1:{free_port()}"
     robot = [sys.executable, "-P", "-m", "tools.bench.null_robot", name, endpoint]
-    words = ["env", "SDL_VIDEODRIVER=dummy", "SDL_AUDIODRIVER=dummy", *lira_command("console", "--name", name)]
-    with contextlib.ExitStack() as stack:
-        server = stack.enter_context(ChildProcess("the robot", robot, tmp_path / "robot.log"))
+    with ChildProcess("the robot", robot, tmp_path / "robot.log") as server:
         server.wait_ready(null_robot.READY, 30.0)
-        command = [*words, "--connect", endpoint]
-        console = stack.enter_context(ChildProcess("the console", command, tmp_path / "console.log"))
-        console.wait_ready("console shows", 30.0)
+        yield name, endpoint
+
+
+def drive_for(reader, duration_s=2.0):
+    """What was applied meanwhile, and the times between two commands as the robot took them."""
+    reader.poll()
+    time.sleep(duration_s)
+    results = [received.message for received in reader.poll()]
+    first = {(r.epoch, r.seq): r.stamp_s - r.command_age_s for r in reversed(results)}
+    return results, np.diff(sorted(first.values()))
+
+
+def test_a_console_that_is_slow_stopped_or_killed_changes_nothing_in_control(tmp_path):
+    with contextlib.ExitStack() as stack:
+        name, endpoint = stack.enter_context(null_robot_on_the_bus(tmp_path))
         bus = Bus(name, connect=endpoint)
+        stack.callback(bus.close)
         reader = bus.reader(APPLIED, depth=512)
-        with policy(name, endpoint):
-            time.sleep(1.5)
-            assert reader.newest() is not None
-            assert console.status() is None, console.output()
-            console.signal(signal.SIGSTOP)
-            time.sleep(1.5)
-            results = reader.poll()
-            console.signal(signal.SIGKILL)
-            time.sleep(1.5)
-            results += reader.poll()
-        bus.close()
-    drives = [r.message for r in results]
-    assert len(drives) > 40
-    assert {d.source for d in drives} == {Source.POLICY}
-    assert {d.reason for d in drives} == {Reason.OK}
-    assert all(d.twist != STOP for d in drives)
+        stack.enter_context(policy(name, endpoint))
+        time.sleep(1.0)
+        results, alone_s = drive_for(reader)
+        words = ["--name", name, "--connect", endpoint]
+        commands = {
+            "quick": lira_command("console", *words),
+            "slow": [sys.executable, "-P", "-c", SLOW, "console", *words],
+        }
+        consoles = {}
+        for pace, command in commands.items():
+            silent = ["env", "SDL_VIDEODRIVER=dummy", "SDL_AUDIODRIVER=dummy", *command]
+            consoles[pace] = stack.enter_context(ChildProcess("the console", silent, tmp_path / f"{pace}.log"))
+            consoles[pace].wait_ready("console shows", 30.0)
+        gaps_s = {}
+        more, gaps_s["slow"] = drive_for(reader)
+        assert {console.status() for console in consoles.values()} == {None}
+        results += more
+        for number in (signal.SIGSTOP, signal.SIGKILL):
+            for console in consoles.values():
+                console.signal(number)
+            more, gaps_s[number.name] = drive_for(reader)
+            results += more
+    assert {r.source for r in results} == {Source.POLICY}
+    assert {r.reason for r in results} == {Reason.OK}
+    assert all(r.twist != STOP for r in results)
+    for gaps in (alone_s, *gaps_s.values()):
+        assert len(gaps) > 25
+        assert np.median(gaps) == pytest.approx(np.median(alone_s), abs=0.01), gaps_s
+        assert max(gaps) < 0.25
+
+
+def test_the_keys_ask_and_say_that_nobody_answers(tmp_path):
+    with contextlib.ExitStack() as stack:
+        name, endpoint = stack.enter_context(null_robot_on_the_bus(tmp_path))
+        bus, watch = Bus(name, connect=endpoint), Bus(name, connect=endpoint, watch=True)
+        stack.callback(bus.close)
+        stack.callback(watch.close)
+        bus.ask(INFO)
+        asked, answers = watch.reader(OPERATOR, depth=16), bus.publisher(OPERATOR_ANSWER)
+        ears, keyboard = Ears(watch, load_profile("thesis-sim")), Keyboard(Wheel(bus, watch, 10.0))
+        heard = []
+
+        def press(keys, condition):
+            deadline_s = time.monotonic() + 10.0
+            while not condition():
+                assert time.monotonic() < deadline_s, heard
+                keyboard.update(frozenset(keys))
+                heard.extend(received.message for received in asked.poll())
+                time.sleep(1 / 30)
+
+        def view():
+            return replace(ears.look(), unanswered=keyboard.unanswered)
+
+        press("", lambda: keyboard.state == "ready")
+        press("p", lambda: heard == [OperatorRequest(Request.PAUSE)])
+        press("", lambda: keyboard.unanswered is Request.PAUSE)
+        assert operator_words(view()) == ("nobody answers to 'pause': does lira fusion run?", False)
+        answers.put(OperatorAnswer(0.0, paused=True, count=1, words="paused"), 0.0)
+        press("", lambda: operator_words(view()) == ("paused", True))
+        press("p", lambda: heard[1:] == [OperatorRequest(Request.RESUME)])
+        press("r", lambda: heard[2:] == [OperatorRequest(Request.RESET)])
 
 
 def test_the_keyboard_drives_locks_without_the_focus_and_comes_back(tmp_path):
