@@ -13,12 +13,12 @@ from hal.errors import BusError, ConfigError
 from hal.estop import look_at_estop, press_estop
 from hal.governed import GovernedRobot
 from hal.keys import KEY, WRITERS, load_keys
-from hal.messages import STOP, Command, Reason, Twist
+from hal.messages import STOP, Command, Joy, OperatorRequest, Reason, Request, Twist
 from hal.null import NullRobot
 from hal.profile import load_profile
 from hal.remote import RemoteRobot
 from hal.server import HalServer
-from hal.topics import APPLIED, CMD_VEL, DIAGNOSTICS, SIM_STATE
+from hal.topics import APPLIED, CMD_VEL, DIAGNOSTICS, JOY, OPERATOR, SIM_STATE
 from tools.authority import enroll, init
 from tools.cli import main
 from tools.processes import ChildProcess, free_port, lira_command
@@ -99,6 +99,37 @@ def test_a_viewer_sees_and_stops_but_does_not_drive(folder, robot):
         assert press_estop(bus).pressed
     finally:
         assert bus.close()
+
+
+def test_joy_and_requests_come_from_who_may_drive_and_from_no_viewer(folder, robot):
+    endpoint, _ = robot
+    watch = Bus(NAME, connect=endpoint, keys=load_keys(folder / "laptop"), watch=True)
+    anna = Bus(NAME, connect=endpoint, keys=load_keys(folder / "anna"))
+    guest = Bus(NAME, connect=endpoint, keys=load_keys(folder / "guest"))
+    joys, requests = watch.reader(JOY, depth=64), watch.reader(OPERATOR, depth=64)
+    pads = [(bus, bus.publisher(JOY), bus.publisher(OPERATOR)) for bus in (anna, guest)]
+    heard = []
+    try:
+        deadline_s = time.monotonic() + 15.0
+        while time.monotonic() < deadline_s and len({type(r.message) for r in heard}) < 2:
+            for _, joy, operator in pads:
+                joy.put(Joy(0.0, (1.0,), (1,)), 0.0)
+                operator.put(OperatorRequest(Request.PAUSE), 0.0)
+            time.sleep(0.02)
+            heard += [*joys.poll(), *requests.poll()]
+        # Both have long been connected: what the guest sends now, the robot lets nobody hear.
+        for _ in range(50):
+            for _, joy, operator in pads:
+                joy.put(Joy(0.0, (1.0,), (1,)), 0.0)
+                operator.put(OperatorRequest(Request.PAUSE), 0.0)
+            time.sleep(0.02)
+        heard += [*joys.poll(), *requests.poll()]
+        assert guest.peers() == anna.peers() == 1
+        assert {type(r.message) for r in heard} == {Joy, OperatorRequest}
+        assert {r.attachment.epoch for r in heard} == {anna.epoch}
+    finally:
+        for bus in (watch, anna, guest):
+            bus.close()
 
 
 def plain_session(endpoint, **more):
