@@ -1,0 +1,268 @@
+"""What a person asks is done between two steps, answered with a line, and moves nothing without a neutral command."""
+
+import contextlib
+import threading
+import time
+from dataclasses import dataclass, field, replace
+
+import pytest
+
+from fusion.control import ControlLoop
+from fusion.journal import Journal
+from fusion.method import Alone
+from fusion.requests import RequestDesk, RequestLine
+from fusion.service import serve
+from hal.bus import Bus
+from hal.codec import encode
+from hal.errors import BusError, StorageError
+from hal.messages import STOP, OperatorRequest, Reason, Request, Twist
+from hal.null import NullRobot
+from hal.profile import load_profile
+from hal.topics import OPERATOR, OPERATOR_ANSWER
+from tools.processes import free_port
+
+PROFILE = load_profile("thesis-sim")
+GO = (0.5, 0.0)
+
+
+class Script:
+    """A line on which these things are asked, one list before each step; then the service is stopped."""
+
+    def __init__(self, *script, in_time=True):
+        self.script, self.in_time = list(script), in_time
+        self.stop, self.answers = threading.Event(), []
+
+    def poll(self):
+        asked = self.script.pop(0)
+        if not self.script:
+            self.stop.set()
+        return [(request, self.in_time) for request in asked]
+
+    def put(self, **answer):
+        if not self.answers or self.answers[-1] != answer:
+            self.answers.append(answer)
+
+
+def ask(request, name=""):
+    return [OperatorRequest(request, name)]
+
+
+class Drives(NullRobot):
+    """Keeps what it is told, and stops by itself with the `held` reason."""
+
+    held = None
+
+    def __init__(self):
+        super().__init__(PROFILE)
+        self.twists = []
+
+    def drive(self, command):
+        self.twists.append(command.twist)
+        applied = super().drive(command)
+        return applied if self.held is None else replace(applied, twist=STOP, reason=self.held)
+
+
+@dataclass
+class Learner:
+    """A method that counts what happens to it."""
+
+    resets: int = 0
+    chosen: list = field(default_factory=list)
+
+    def reset(self):
+        self.resets += 1
+
+    def update(self, now_s):
+        pass
+
+    def propose(self, features):
+        return Alone("novice", lambda _: GO).propose(features)
+
+    def learn(self, proposal, human):
+        return Alone("novice", lambda _: GO).learn(proposal, human)
+
+
+class Choosing(Learner):
+    def choose(self, name):
+        self.chosen.append(name)
+        return None if name == "camera" else f"no expert is called '{name}'"
+
+
+class Service:
+    def __init__(self, line, method=None, robot=None, **words):
+        self.line, self.method, self.robot = line, method or Learner(), robot or Drives()
+        self.said, self.written = [], []
+        journal, loop = Journal(write=self.written.append), ControlLoop(self.robot)
+        self.desk = RequestDesk(line, loop, self.method, journal, self.said.append, **words)
+        with contextlib.closing(self.desk):
+            serve(loop, self.method, journal, line.stop, lambda _: None, desk=self.desk)
+
+    @property
+    def laps(self):
+        return [record.decision.lap for record in self.written]
+
+
+GO_TWIST = Twist(0.5, 0.0)
+
+
+def test_paused_it_stands_learns_nothing_and_goes_on_after_a_neutral_command():
+    line = Script([], ask(Request.PAUSE), [], ask(Request.PAUSE), ask(Request.RESUME), [])
+    service = Service(line)
+    # One step, three paused ones, a neutral command, two steps.
+    assert service.robot.twists == [GO_TWIST, STOP, STOP, STOP, STOP, GO_TWIST, GO_TWIST]
+    assert len(service.written) == 3
+    assert service.method.resets == 1
+    assert [answer["paused"] for answer in line.answers] == [False, True, True, False]
+    assert [answer["count"] for answer in line.answers] == [0, 1, 2, 3]
+    assert service.said[0].startswith("operator: paused: the robot stands")
+    assert service.said[-1] == "operator: it drives and learns again"
+
+
+def test_to_go_on_when_nothing_was_paused_changes_nothing():
+    service = Service(Script([], ask(Request.RESUME), []))
+    assert service.robot.twists == [GO_TWIST] * 3
+    assert service.method.resets == 0
+
+
+def test_a_pause_does_not_arm_a_robot_that_stopped_by_itself_and_the_person_who_ends_it_does():
+    robot = Drives()
+    robot.held = Reason.STALE
+    service = Service(Script([], ask(Request.PAUSE), [], ask(Request.RESUME)), robot=robot)
+    assert service.robot.twists == [
+        GO_TWIST,
+        STOP,
+        GO_TWIST,
+    ]  # what was refused, the neutral command at the end, the next
+
+
+def test_a_reset_puts_a_twin_back_and_begins_an_episode_after_a_neutral_command():
+    starts = []
+    service = Service(Script([], ask(Request.RESET), []), restart=lambda: starts.append(len(starts)))
+    assert starts == [0]
+    assert service.robot.twists == [GO_TWIST, STOP, STOP, GO_TWIST, GO_TWIST]
+    assert service.laps == [0, 1, 1]
+    assert service.method.resets == 1
+    assert service.said == ["operator: episode 1 begins, back at the start"]
+
+
+def test_on_a_real_floor_a_reset_is_a_mark():
+    service = Service(Script(ask(Request.RESET), ask(Request.RESET)))
+    assert service.laps == [1, 2]
+    assert service.said == ["operator: episode 1 begins here", "operator: episode 2 begins here"]
+
+
+def test_a_reset_while_paused_leaves_it_paused():
+    service = Service(Script(ask(Request.PAUSE), ask(Request.RESET), []), restart=lambda: None)
+    assert set(service.robot.twists) == {STOP}
+    assert service.desk.paused
+    assert service.written == []
+
+
+def test_a_reset_that_fails_is_refused_and_the_episode_goes_on():
+    def restart():
+        raise BusError("the twin is gone", "Start it.")
+
+    service = Service(Script(ask(Request.RESET), []), restart=restart)
+    assert service.line.answers[-1]["accepted"] is False
+    assert service.said == ["operator: not reset: the twin is gone. Start it."]
+    assert service.laps == [0, 0]
+
+
+def test_what_is_saved_is_taken_at_once_and_written_aside():
+    written, gate, threads = [], threading.Event(), set()
+
+    def snapshot():
+        stamp = len(written)
+
+        def write():
+            assert gate.wait(5.0)
+            threads.add(threading.current_thread())
+            written.append(stamp)
+            return "saved"
+
+        return write
+
+    line = Script(ask(Request.SAVE), ask(Request.SAVE), [])
+    line.stop.set = lambda real=line.stop.set: (gate.set(), real())
+    service = Service(line, snapshot=snapshot)
+    assert len(service.written) == 3  # it drove on meanwhile
+    assert written == [0]
+    assert threads.isdisjoint({threading.main_thread()})
+    assert service.said == ["operator: saved"]
+
+
+def test_a_disk_that_is_full_is_said_and_it_drives_on():
+    def write():
+        raise StorageError("cannot write novice", "Free some space.")
+
+    service = Service(Script(ask(Request.SAVE), [], []), snapshot=lambda: write)
+    assert service.said == ["operator: not saved: cannot write novice. Free some space."]
+    assert service.line.answers[-1]["accepted"] is False
+    assert len(service.written) == 3
+
+
+def test_where_nothing_is_learned_nothing_is_saved():
+    assert "nothing is learned here" in Service(Script(ask(Request.SAVE))).said[0]
+
+
+@pytest.mark.parametrize(
+    ("method", "name", "accepted", "words"),
+    [
+        (Choosing(), "camera", True, "camera drives"),
+        (Choosing(), "sonar", False, "no expert is called 'sonar'"),
+        (Learner(), "camera", False, "this method gives no expert the wheel"),
+    ],
+)
+def test_an_expert_gets_the_wheel_if_the_method_can(method, name, accepted, words):
+    service = Service(Script(ask(Request.WHEEL, name)), method)
+    assert service.method.chosen == ([name] if isinstance(method, Choosing) else [])
+    assert (service.line.answers[-1]["accepted"], service.line.answers[-1]["words"]) == (accepted, words)
+
+
+def test_a_paused_service_gives_nobody_the_wheel():
+    service = Service(Script(ask(Request.PAUSE), ask(Request.WHEEL, "camera")), Choosing())
+    assert service.method.chosen == []
+    assert service.said[-1] == "operator: paused: nobody drives"
+
+
+@pytest.mark.parametrize("request_", list(Request))
+def test_what_comes_too_late_is_not_done(request_):
+    service = Service(Script(ask(request_, "camera"), in_time=False), Choosing(), snapshot=lambda: lambda: "saved")
+    assert service.said == [f"operator: {request_} came too late: ask again"]
+    assert (service.desk.paused, service.desk.episode, service.method.chosen) == (False, 0, [])
+
+
+def wait_for(condition):
+    deadline_s = time.monotonic() + 10.0
+    while not (result := condition()):
+        assert time.monotonic() < deadline_s, "never happened"
+        time.sleep(0.01)
+    return result
+
+
+def test_over_the_bus_a_request_is_judged_by_when_it_was_sent():
+    endpoint, clock_s = f"127.0.0.1:{free_port()}", 100.0
+    robot = Bus("asked", listen=endpoint)
+    service, watch, pad = Bus("asked", connect=endpoint), None, Bus("asked", connect=endpoint)
+    try:
+        wait_for(lambda: service.peers() and pad.peers())
+        watch = Bus("asked", connect=endpoint, watch=True)
+        line, publisher = RequestLine(service, watch, lambda: clock_s), pad.publisher(OPERATOR)
+        answers = watch.reader(OPERATOR_ANSWER)
+        wait_for(lambda: publisher.matching)
+        for age_s in (0.5, 1.5):
+            publisher.put(OperatorRequest(Request.PAUSE), clock_s - age_s)
+        heard = []
+        wait_for(lambda: heard.extend(line.poll()) or len(heard) == 2)
+        pad.put_raw(OPERATOR, encode(OperatorRequest(Request.RESUME)))  # as a ROS peer does
+        wait_for(lambda: heard.extend(line.poll()) or len(heard) == 3)
+        assert [(asked.request, in_time) for asked, in_time in heard] == [
+            (Request.PAUSE, True), (Request.PAUSE, False), (Request.RESUME, True),
+        ]  # fmt: skip
+        line.put(paused=True, count=1, accepted=True, words="paused")
+        answer = wait_for(answers.newest).message
+        assert (answer.stamp_s, answer.paused, answer.words) == (clock_s, True, "paused")
+    finally:
+        for bus in (watch, pad, service, robot):
+            if bus is not None:
+                bus.close()
