@@ -31,6 +31,7 @@ VERBS = {
     "report": Verb("tools.verbs.report", "make the HTML page of a recorded run"),
     "keys": Verb("tools.verbs.keys", "make the keys that say who may drive a robot, and encrypt the bus"),
     "stop-test": Verb("tools.verbs.stop_test", "break things while a robot drives, and measure how soon it stands"),
+    "parity": Verb("tools.verbs.parity", "the same motions on two robots, and where they differ"),
     "world": Verb("tools.verbs.world", "draw a world from above and as the camera sees it"),
     "bench": Verb("tools.verbs.bench", "measure speed on this machine"),
 }

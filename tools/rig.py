@@ -31,17 +31,22 @@ def direct(name: str, endpoint: str, twin: Sequence[str], *, lockstep: bool) -> 
     return [Part("the twin", "twin.log", "serves world", lambda _: lira_command(*words))]
 
 
-def wired(name: str, endpoint: str, arena: str, folder: Path, twin: Sequence[str]) -> list[Part]:
-    """`lira robot` on the devices of a twin, which makes them in `folder` and tells the truth at `arena`."""
+def wired(
+    name: str, endpoint: str, arena: str, folder: Path, twin: Sequence[str], robot: Sequence[str] = ()
+) -> list[Part]:
+    """`lira robot` on the devices of a twin, which makes them in `folder` and tells the truth at `arena`.
+
+    `robot` are more words for `lira robot`.
+    """
     words = ["twin", *twin, "--name", name, "--wire", str(folder), "--arena", arena]
 
-    def robot(line: str) -> list[str]:
+    def open_devices(line: str) -> list[str]:
         devices = shlex.split(line.partition(OPEN_WITH)[2])
-        return lira_command("robot", *devices, "--name", name, "--listen", endpoint)
+        return lira_command("robot", *devices, *robot, "--name", name, "--listen", endpoint)
 
     return [
         Part("the twin", "twin.log", OPEN_WITH, lambda _: lira_command(*words)),
-        Part("the robot", "robot.log", "serves", robot),
+        Part("the robot", "robot.log", "serves", open_devices),
     ]
 
 

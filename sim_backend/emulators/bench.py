@@ -7,9 +7,11 @@ from pathlib import Path
 
 import cv2
 import numpy as np
+from msgspec.structs import replace
 
 from hal.errors import DeviceError
 from hal.messages import Command, CompressedImage, CourseState, Episode, Image, LaserScan, Odometry, Twist
+from hal.profile import RobotProfile
 from sim_backend.emulators.camera import MjpegServer
 from sim_backend.emulators.core2 import Core2Unit, Firmware
 from sim_backend.emulators.rplidar import Model, RplidarUnit
@@ -125,6 +127,11 @@ class WiredTwin:
         if scan.range_max < REACH_M:
             ranges = np.where(np.isposinf(ranges), REACH_M, ranges)
         return np.where(np.isfinite(ranges), ranges, 0.0)
+
+
+def sweeping(profile: RobotProfile) -> RobotProfile:
+    """Return the profile for a twin behind wires: a head that turns sees now what the twin takes in whole turns."""
+    return replace(profile, lidar=replace(profile.lidar, rate_hz=1.0 / LOOK_S))
 
 
 def jpeg_of(image: Image | CompressedImage) -> bytes:

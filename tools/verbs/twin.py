@@ -123,10 +123,11 @@ def run_wire(args: argparse.Namespace, profile: "RobotProfile", world: "World") 
     """Be the robot's devices until told to stop."""
     from hal.bus import Bus
     from hal.server import stop_on_signal
-    from sim_backend.emulators.bench import WiredTwin
+    from sim_backend.emulators.bench import WiredTwin, sweeping
     from sim_backend.twin import Twin
 
-    twin = Twin(profile, world, layout=args.layout, seed=args.seed, realtime_factor=1.0, renderer=args.renderer)
+    sweep = sweeping(profile)
+    twin = Twin(sweep, world, layout=args.layout, seed=args.seed, realtime_factor=1.0, renderer=args.renderer)
     with stop_on_signal() as stop, ExitStack() as held:
         bus = None
         if args.arena is not None:
@@ -134,11 +135,9 @@ def run_wire(args: argparse.Namespace, profile: "RobotProfile", world: "World") 
             held.callback(bus.close)
         wired = WiredTwin(twin, args.wire)
         try:
-            words = ["--lidar", f"{args.wire}/rplidar", "--base", f"{args.wire}/core2", "--camera", wired.url]
-            words += ["--profile", args.profile]
-            print(
-                f"world '{world.name}' behind its devices; open them with: lira robot {shlex.join(words)}", flush=True
-            )
+            urls = ["--lidar", f"{args.wire}/rplidar", "--base", f"{args.wire}/core2", "--camera", wired.url]
+            urls += ["--profile", args.profile]
+            print(f"world '{world.name}' behind its devices; open them with: lira robot {shlex.join(urls)}", flush=True)
             if bus is None:
                 stop.wait()
             else:

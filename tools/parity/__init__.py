@@ -1,0 +1,1 @@
+"""The same script of motions on two robots, and where they differ."""

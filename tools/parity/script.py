@@ -1,0 +1,46 @@
+"""The script of motions: what is commanded, and for how long. It ends about where it began."""
+
+from dataclasses import dataclass
+
+from hal.messages import STOP, Twist
+from hal.profile import Base
+
+STAND_S = 3.0  # both robots see the same then, if they stand in the same place
+STEP_S = 2.0
+REST_S = 1.5
+SETTLED_S = 0.6  # the last part of a step counts as settled
+REACH_M = 0.8  # of free floor that a step may take
+TURN_RAD = 1.6
+
+
+@dataclass(frozen=True, slots=True)
+class Phase:
+    """A constant command."""
+
+    name: str
+    twist: Twist
+    duration_s: float
+
+
+def motions(base: Base) -> tuple[Phase, ...]:
+    """Return the script for a base: stand, ahead and back, left and right, each from rest to rest.
+
+    Half its top speed, or less where that would go farther than `REACH_M` or turn by more than `TURN_RAD`.
+    """
+    linear_m_s = min(base.max_linear_m_s / 2, REACH_M / STEP_S)
+    angular_rad_s = min(base.max_angular_rad_s / 2, TURN_RAD / STEP_S)
+    steps = {
+        "ahead": Twist(linear_m_s, 0.0),
+        "back": Twist(-linear_m_s, 0.0),
+        "left": Twist(0.0, angular_rad_s),
+        "right": Twist(0.0, -angular_rad_s),
+    }
+    script = [Phase("stand", STOP, STAND_S)]
+    for name, twist in steps.items():
+        script += [Phase(name, twist, STEP_S), Phase(f"{name} stop", STOP, REST_S)]
+    return tuple(script)
+
+
+def script_of(base: Base) -> dict[str, Phase]:
+    """Return the script by the names of its phases."""
+    return {phase.name: phase for phase in motions(base)}
