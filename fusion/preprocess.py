@@ -16,6 +16,7 @@ from hal.profile import RobotProfile
 
 # Beam angles arrive as float32, so a beam that lies on the edge between two bins is off by less than this.
 EDGE_BINS = 1e-3
+DARK = 12 / 255  # no pixel brighter than this: a covered lens, a dead sensor, a dark room
 MAX_IMAGE_PX = 8192  # a side; a header that claims more is broken, and decoding it would take gigabytes
 
 _UNIT = (np.arange(256) / 255).astype(np.float32)
@@ -64,6 +65,7 @@ class Preprocessor:
         try:
             scan, invalid = bin_scan(observation.scan, self._shape)
             image = gray_image(observation.image, self._shape.image_px)
+            _check_light(image)
         except ReadingError as error:
             self.refused[error.reason] += 1
             raise
@@ -170,6 +172,11 @@ def gray_image(image: Image | CompressedImage, px: int) -> FloatArray:
     if gray.shape != (px, px):
         gray = cv2.resize(gray, (px, px), interpolation=cv2.INTER_AREA).astype(np.uint8, copy=False)
     return from_uint8(gray)
+
+
+def _check_light(image: FloatArray) -> None:
+    if float(image.max()) <= DARK:
+        raise ReadingError("image black", "the camera's image is black", "Uncover the lens, and switch on the light.")
 
 
 def to_uint8(image: FloatArray) -> ByteArray:

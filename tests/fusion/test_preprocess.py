@@ -282,3 +282,14 @@ def test_the_preprocessor_counts_what_it_leaves_out():
         preprocess(observation(scan=sim_scan(np.ones(7))))
     assert preprocess.invalid_beams == 6
     assert preprocess.refused == {"image truncated": 2, "scan length": 1}
+
+
+def test_a_black_image_is_refused_and_a_dim_one_is_not():
+    preprocess = Preprocessor(SIM)
+    noise = np.random.default_rng(1).integers(0, 9, (48, 64, 3)).astype(np.uint8)
+    with pytest.raises(SensorError, match="black"):
+        preprocess(observation(image=Image(0.0, noise)))
+    assert preprocess.refused == {"image black": 1}
+    dim = noise.copy()
+    dim[24:, 20:40] = 30
+    assert preprocess(observation(image=Image(0.0, dim))) is not None

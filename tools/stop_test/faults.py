@@ -147,7 +147,7 @@ FAULTS = (
     Fault("lidar freezes", _robot("lidar freezes"), _robot(""), stopped_by=SEES, asks=True, quick=True),
     Fault("half a scan", _robot("half a scan"), _robot(""), stopped_by=SEES, asks=True),
     Fault("camera read never returns", _robot("camera hangs"), _robot(""), stopped_by=SEES, asks=True, quick=True),
-    Fault("black image", _robot("black image"), _robot(""), silence=True),
+    Fault("black image", _robot("black image"), _robot(""), stopped_by=SEES, asks=True),
     Fault("robot's main thread hangs", _robot("main hangs"), silence=True, hold_s=2.0),
     Fault("base hangs on a command", _robot("base hangs"), _robot(""), hold_s=1.6, stopped_by="firmware",
           budget_s=FIRMWARE_BUDGET_S),
