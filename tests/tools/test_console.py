@@ -103,11 +103,11 @@ def test_only_what_changed_changes_on_the_screen():
     before = picture(VIEW)
     charged = picture(replace(VIEW, battery=BatteryState(1.0, 12.5)))
     changed = np.any(before != charged, axis=-1)
-    assert changed[:, 668:].any()
-    assert not changed[:, :660].any()
+    assert changed[:, 628:].any()
+    assert not changed[:, :620].any()
     nearer = picture(replace(VIEW, scan=replace(SCAN, ranges=np.full(5, 0.5, np.float32))))
     changed = np.any(before != nearer, axis=-1)
-    assert changed[16:544, 358:656].any()
+    assert changed[16:544, 358:618].any()
     assert not changed[545:].any()
 
 
@@ -118,7 +118,7 @@ def test_a_stale_picture_is_not_shown():
 
 
 def test_actions_of_an_old_decision_are_not_shown_and_its_counts_are():
-    bars, counts = pygame.Rect(690, 240, 560, 200), pygame.Rect(576, 520, 60, 40)
+    bars, counts = pygame.Rect(690, 240, 560, 200), pygame.Rect(576, 488, 60, 40)
     fresh, old = picture(VIEW), picture(replace(VIEW, decision_age_s=2.0))
     assert share_of(part(fresh, bars), SKY) > 0.02
     assert share_of(part(old, bars), SKY) == 0.0
@@ -170,7 +170,7 @@ def test_an_answer_is_shown_with_its_verdict():
     assert operator_words(VIEW) == ("nobody takes requests: start lira fusion", None)
     assert operator_words(replace(VIEW, answer=OperatorAnswer(1.0), answer_age_s=0.1))[1] is None
     assert (operator_words(PAUSED), operator_words(refused)) == (("paused", True), ("paused", False))
-    edge = pygame.Rect(560, 604, 9, 46)
+    edge = pygame.Rect(560, 570, 9, 42)
     colours = [share_of(part(picture(view), edge), colour) for view, colour in ((PAUSED, GREEN), (refused, RED))]
     assert min(colours) > 0.9
 

@@ -8,7 +8,7 @@ from hal.messages import Action, ExpertView, LaserScan
 from tools.console.palette import AMBER, BACK, BLUE, DIM, EDGE, GREEN, PANEL, RED, SKY, TEXT, panel, write
 from tools.console.state import LOW_V, STALE_S, View, battery_share, driver_words, operator_words
 
-SIZE = (1280, 720)  # fits a screen of 1366 by 768 with a window's frame
+SIZE = (1280, 680)  # fits a screen of 1366 by 768 with a desktop's bar and a window's frame
 CALL_WORDS = {
     "attention": ("ATTENTION", "one expert drives: watch it", AMBER, (0, 0, 0)),
     "feedback": ("YOUR DECISION", "experts disagree: take the wheel", RED, (255, 255, 255)),
@@ -20,13 +20,13 @@ def draw(surface: pygame.Surface, view: View) -> None:
     """The whole console, for a surface of `SIZE`."""
     surface.fill(BACK)
     draw_camera(surface, pygame.Rect(16, 16, 528, 330), view)
-    draw_scan(surface, pygame.Rect(16, 358, 528, 298), view)
+    draw_scan(surface, pygame.Rect(16, 358, 528, 260), view)
     draw_driver(surface, pygame.Rect(560, 16, 704, 80), view)
     draw_call(surface, BANNER, view.call)
-    draw_actions(surface, pygame.Rect(560, 204, 704, 276), view)
-    draw_counts(surface, pygame.Rect(560, 490, 704, 98), view)
-    draw_operator(surface, pygame.Rect(560, 598, 704, 58), view)
-    draw_status(surface, pygame.Rect(16, 668, 1248, 40), view)
+    draw_actions(surface, pygame.Rect(560, 204, 704, 246), view)
+    draw_counts(surface, pygame.Rect(560, 460, 704, 94), view)
+    draw_operator(surface, pygame.Rect(560, 564, 704, 54), view)
+    draw_status(surface, pygame.Rect(16, 628, 1248, 40), view)
 
 
 def draw_camera(surface: pygame.Surface, box: pygame.Rect, view: View) -> None:
@@ -115,7 +115,8 @@ def draw_actions(surface: pygame.Surface, box: pygame.Rect, view: View) -> None:
     panel(surface, box, "actions: turn and speed, each of the robot's limits; activation beside its threshold")
     decision = view.deciding
     if decision is None:
-        write(surface, "nobody decides: start lira fusion", box.center, 28, DIM, centre=True)
+        idle = "paused" if view.paused else "nobody decides: start lira fusion"
+        write(surface, idle, box.center, 28, DIM, centre=True)
         return
     rows: list[tuple[str, Action, ExpertView | None]] = [(e.name, e.action, e) for e in decision.experts]
     rows.append(("novice", decision.novice, None))
@@ -172,8 +173,8 @@ def draw_counts(surface: pygame.Surface, box: pygame.Rect, view: View) -> None:
     )
     for index, (name, count) in enumerate(pairs):
         x = box.x + 16 + index * (box.width - 20) // len(pairs)
-        write(surface, str(count), (x, box.y + 32), 42, TEXT)
-        write(surface, name, (x, box.y + 72), 20, DIM)
+        write(surface, str(count), (x, box.y + 30), 42, TEXT)
+        write(surface, name, (x, box.y + 70), 20, DIM)
 
 
 def draw_operator(surface: pygame.Surface, box: pygame.Rect, view: View) -> None:
@@ -183,11 +184,11 @@ def draw_operator(surface: pygame.Surface, box: pygame.Rect, view: View) -> None
     colour = DIM if accepted is None else GREEN if accepted else RED
     pygame.draw.rect(surface, colour, (box.x, box.y, 10, box.height), border_radius=4)
     verdict = "" if accepted is None else "done: " if accepted else "no: "
-    write(surface, verdict + words, (box.x + 26, box.y + 9), 24, DIM if accepted is None else TEXT)
+    write(surface, verdict + words, (box.x + 26, box.y + 8), 24, DIM if accepted is None else TEXT)
     names = () if view.decision is None else (expert.name for expert in view.decision.experts)
     keys = ["P " + ("go on" if view.paused else "pause"), "S save", "R held: new episode"]
     keys += [f"{number} {name} drives" for number, name in enumerate(names, start=1)]
-    write(surface, "    ".join(keys), (box.x + 26, box.y + 34), 20, DIM)
+    write(surface, "    ".join(keys), (box.x + 26, box.y + 32), 20, DIM)
 
 
 def draw_status(surface: pygame.Surface, box: pygame.Rect, view: View) -> None:
