@@ -1,18 +1,43 @@
 """LIRA-SPF against HG-DAgger on one world: Table II (`line-obstacles`) and figures 11 and 12 (`race`)."""
 
 from collections.abc import Sequence
+from functools import partial
 
 import numpy as np
 
+from tools.experiments.experiment import Experiment, Finding, Outcomes, Row, Table
 from tools.experiments.methods import HG_DAGGER, LIRA
 from tools.experiments.statistics import iqm, median_interval, paired_ratios
 from tools.experiments.trial import Outcome, Trial
 
 QUANTITIES = ("human_labels", "interventions")
-Cells = list[str]
+# Table II as printed, in the columns of our summary.
+THESIS: list[Row] = [
+    {
+        "method": "thesis: LIRA-SPF",
+        "n": 10,
+        "buffer_first": 158,
+        "human_labels_first": 50,
+        "interventions_first": 7,
+        "buffer": 273.5,
+        "human_labels": 59,
+        "interventions": 9.5,
+    },
+    {
+        "method": "thesis: HG-DAgger",
+        "n": 10,
+        "buffer_first": 167,
+        "human_labels_first": 96.5,
+        "interventions_first": 11,
+        "buffer": 228,
+        "human_labels": 156.5,
+        "interventions": 19.5,
+    },
+]
+THESIS_RATIOS = {"human_labels": 156.5 / 59, "interventions": 19.5 / 9.5}
 
 
-def trials(world: str, seeds: int) -> list[Trial]:
+def trials(seeds: int, world: str) -> list[Trial]:
     """Every method on every seed."""
     return [Trial(method, world, seed) for method in (*LIRA, *HG_DAGGER) for seed in range(seeds)]
 
@@ -25,9 +50,9 @@ def by_method(outcomes: Sequence[Outcome]) -> dict[str, list[Outcome]]:
     return groups
 
 
-def summary(outcomes: Sequence[Outcome]) -> list[dict[str, object]]:
+def summary(outcomes: Sequence[Outcome]) -> list[Row]:
     """One row per method: medians and interquartile means over the seeds, after the first lap and at the end."""
-    rows: list[dict[str, object]] = []
+    rows: list[Row] = []
     for method, group in by_method(outcomes).items():
         first = [outcome.after(1) for outcome in group]
         final = [outcome.result for outcome in group]
@@ -58,13 +83,13 @@ def summary(outcomes: Sequence[Outcome]) -> list[dict[str, object]]:
     return rows
 
 
-def ratios(outcomes: Sequence[Outcome]) -> list[dict[str, object]]:
+def ratios(outcomes: Sequence[Outcome]) -> list[Row]:
     """HG-DAgger over LIRA-SPF, pair by pair of one seed, with 95 % bootstrap intervals of the median.
 
     `censored` counts pairs in which either run met its cap. Where that is HG-DAgger's, its true ratio is larger.
     """
     groups = by_method(outcomes)
-    rows: list[dict[str, object]] = []
+    rows: list[Row] = []
     for method in (each.name for each in LIRA if each.name in groups):
         for against in (each.name for each in HG_DAGGER if each.name in groups):
             pairs = list(zip(groups[method], groups[against], strict=True))
@@ -92,3 +117,40 @@ def ratios(outcomes: Sequence[Outcome]) -> list[dict[str, object]]:
 
 def _median(values: Sequence[float]) -> float:
     return float(np.median(np.asarray(values, dtype=np.float64)))
+
+
+def tables(outcomes: Outcomes, thesis: Sequence[Row]) -> list[Table]:
+    """The methods beside the thesis's, and the paired ratios."""
+    words = ", ".join(f"{value:.2f} {quantity}" for quantity, value in THESIS_RATIOS.items())
+    return [
+        Table("Labels and interventions until the novice passed its proving run", [*summary(outcomes), *thesis]),
+        Table("HG-DAgger over LIRA-SPF, by pairs of one seed", ratios(outcomes), f"Thesis, Table II: {words}."),
+    ]
+
+
+def findings(outcomes: Outcomes, name: str) -> list[Finding]:
+    """Whether LIRA-SPF needs less of the human than HG-DAgger at the same m, and by as much as the thesis says."""
+    found: list[Finding] = []
+    for row in ratios(outcomes):
+        if row["against"] != HG_DAGGER[0].name:
+            continue
+        method, quantity = str(row["method"]), str(row["quantity"])
+        median, low, high = (float(str(row[each])) for each in ("median", "low", "high"))
+        ours = f"{median:.2f} [{low:.2f}, {high:.2f}], n {row['n']}, {row['censored']} censored"
+        theirs, words = THESIS_RATIOS[quantity], quantity.replace("_", " ")
+        key = f"{name}.{method}.{quantity}"
+        claim = f"HG-DAgger over {method}, {words}"
+        found.append(Finding(f"{key}.fewer", f"{claim}: above 1", f"{theirs:.2f}", ours, low > 1.0))
+        found.append(Finding(f"{key}.size", f"{claim}: as in Table II", f"{theirs:.2f}", ours, low <= theirs <= high))
+    return found
+
+
+EXPERIMENTS = {
+    name: Experiment(
+        trials=partial(trials, world=world),
+        tables=partial(tables, thesis=thesis),
+        findings=partial(findings, name=name),
+        ratios=ratios,
+    )
+    for name, world, thesis in (("table2", "line-obstacles", THESIS), ("race", "race", []))
+}

@@ -1,0 +1,29 @@
+"""The one list of experiments. Without heavy imports: a module is loaded when its experiment is asked for."""
+
+import importlib
+from typing import TYPE_CHECKING, NamedTuple
+
+if TYPE_CHECKING:
+    from tools.experiments.experiment import Experiment
+
+
+class Entry(NamedTuple):
+    """What an experiment shows, and the module of `tools.experiments` whose `EXPERIMENTS` holds it."""
+
+    words: str
+    module: str
+
+
+REGISTRY = {
+    "table2": Entry("LIRA-SPF and HG-DAgger on line-obstacles (Table II)", "compare"),
+    "race": Entry("the same on the 120 m race with 21 boxes (fig. 11, 12)", "compare"),
+    "tableC1": Entry("activation thresholds on the figure-eight, redundancy filter off (Table C.1)", "thresholds"),
+    "tableC2": Entry("activation and redundancy thresholds on the figure-eight (Table C.2)", "thresholds"),
+}
+
+
+def load(name: str) -> "Experiment":
+    """Import an experiment. Raises `KeyError` for a name that is not in the registry."""
+    module = importlib.import_module(f"tools.experiments.{REGISTRY[name].module}")
+    experiment: Experiment = module.EXPERIMENTS[name]
+    return experiment
