@@ -14,6 +14,7 @@ from hal.topics import BATTERY, CAMERA, IMU, ODOM, RANGES, SCAN, Topic
 from robot.camera.device import CameraDevice
 from robot.camera.source import Picture
 from robot.core2.device import Core2
+from robot.interlock import Interlock
 from robot.keeper import Keeper
 from robot.rplidar.device import RPLidar
 from robot.settings import Settings
@@ -44,12 +45,11 @@ class Rosbot:
 
     def __init__(self, profile: RobotProfile, devices: Devices) -> None:
         self._profile = profile
-        self._lock = threading.Lock()
         self._scan: LaserScan | None = None
         self._picture: Picture | None = None
         self._newest: Observation | None = None
         self._news = threading.Event()  # a scan or a picture; the base is read often enough
-        self._armed = False
+        self._interlock = Interlock()
         self._open = False
         self.base = Core2(devices.base, devices.settings.base, profile.control.robot_timeout_s)
         self.lidar: RPLidar | None = None
@@ -102,15 +102,7 @@ class Rosbot:
 
     def drive(self, command: Command) -> Applied:
         """Send a velocity to the base, or zero if the robot may not move."""
-        lost = self._lost()
-        twist, reason, clamps = command.twist, Reason.OK, lost
-        with self._lock:
-            if lost:
-                self._armed, twist, reason = False, STOP, Reason.STALE
-            elif not self._armed:
-                self._armed = command.twist == STOP
-                if not self._armed:
-                    twist, reason, clamps = STOP, Reason.NEUTRAL_FIRST, ("neutral_first",)
+        twist, reason, clamps = self._interlock.judge(command.twist, self._lost())
         try:
             self.base.drive(twist)
         except ValueError:  # not finite

@@ -22,6 +22,7 @@ VERBS = {
     "demo": Verb("tools.verbs.demo", "teach a robot in the digital twin, from start to report, in minutes"),
     "twin": Verb("tools.verbs.twin", "the digital twin: a simulated ROSbot on the bus"),
     "robot": Verb("tools.verbs.robot", "the physical ROSbot: opens its lidar, camera and base, and puts it on the bus"),
+    "ros2": Verb("tools.verbs.ros2", "a robot that runs ROS 2: puts it on the bus through zenoh-bridge-ros2dds"),
     "calibrate": Verb("tools.verbs.calibrate", "measure how far the base really goes, and write it into its settings"),
     "fusion": Verb("tools.verbs.fusion", "the learner: reads sensors, decides, drives, trains (LIRA-SPF, HG-DAgger)"),
     "train-expert": Verb("tools.verbs.train_expert", "train the camera or the lidar expert"),

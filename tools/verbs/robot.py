@@ -13,14 +13,18 @@ examples:
 import argparse
 import threading
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import Protocol
 
 from hal.errors import ConfigError
 
-if TYPE_CHECKING:
-    from robot.rosbot import Rosbot
-
 LOOK_S = 0.2
+
+
+class Troubled(Protocol):
+    """A robot that says what is wrong with it."""
+
+    def troubles(self) -> dict[str, str]:
+        """What is lost, each with its remedy."""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -90,7 +94,7 @@ def run(args: argparse.Namespace) -> int:
     return 0
 
 
-def report(robot: "Rosbot", stop: threading.Event) -> None:
+def report(robot: Troubled, stop: threading.Event) -> None:
     """Say which device is lost, and when it is back."""
     known: dict[str, str] = {}
     while not stop.wait(LOOK_S):

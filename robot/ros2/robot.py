@@ -1,0 +1,170 @@
+"""A robot behind zenoh-bridge-ros2dds as a `hal.port.Robot`: its topics are read and written as ROS 2 has them."""
+
+import threading
+import time
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+from hal.bus import Bus, Publisher, Reader
+from hal.clock import ClockEstimate
+from hal.errors import BusError, ConfigError, DeviceError
+from hal.messages import STOP, Applied, Command, Observation, Reason, Source, Twist, TwistStamped
+from hal.profile import RobotProfile
+from hal.topics import BATTERY, CAMERA, CMD_VEL, IMU, ODOM, SCAN, SENSOR, Topic
+from robot.interlock import Interlock
+from robot.ros2.forms import placed_scan, plain_picture
+
+SENSED: dict[str, Topic[Any]] = {"scan": SCAN, "camera": CAMERA, "odom": ODOM, "imu": IMU, "battery": BATTERY}
+NEEDED = {"scan": "no_lidar", "camera": "no_camera"}
+CLOCKS = ("scan", "odom", "imu")  # stamped by the robot's computer; a camera may have a clock of its own
+COMMANDED = "cmd_vel"
+BLIND_S = 0.5  # driven on nothing older than this
+OPEN_S = 10.0
+LOOK_S = 0.002
+SEND_S = 0.05
+FAREWELL = 3
+BRIDGE = "Does zenoh-bridge-ros2dds run there and let this topic through? Name it with --topic NAME=ROS_TOPIC."
+
+
+@dataclass(frozen=True, slots=True)
+class Interface:
+    """How the robot's ROS 2 names and types differ from ours, and how its lidar is mounted.
+
+    `topics` gives another topic to any of scan, camera, odom, imu, battery, cmd_vel; `stamped`: it wants TwistStamped.
+    """
+
+    topics: Mapping[str, str] = field(default_factory=dict)
+    stamped: bool = False
+    lidar_yaw_rad: float = 0.0
+
+    def __post_init__(self) -> None:
+        """Raise `ConfigError` for a name that is none of ours."""
+        for name in self.topics.keys() - {*SENSED, COMMANDED}:
+            raise ConfigError(f"'{name}' is no topic that can be named", f"Choose of {', '.join(SENSED)}, {COMMANDED}.")
+
+    def topic(self, name: str) -> Topic[Any]:
+        """A topic of ours by the robot's name for it; ROS 2 keeps no latched value for us."""
+        ours: Topic[Any] = CMD_VEL if name == COMMANDED else SENSED[name]
+        kind = TwistStamped if name == COMMANDED and self.stamped else ours.kind
+        qos = SENSOR if ours.qos.latched else ours.qos
+        return replace(ours, key=self.topics.get(name, ours.key).strip("/"), kind=kind, qos=qos)
+
+
+class Ros2Robot:
+    """Implements `hal.port.Robot` and `Herald`. Its clock is the robot's ROS clock, as its sensors' stamps tell it.
+
+    Everything that makes it safe happens on this side. `Applied` says what was sent: what the robot's own stack makes
+    of it, nobody here knows. It stands while the scan or the picture is lost, and until a zero command after that.
+    """
+
+    def __init__(self, profile: RobotProfile, bus: Bus, interface: Interface) -> None:
+        self._profile = profile
+        self._interface = interface
+        self._readers: dict[str, Reader[Any]] = {name: bus.reader(interface.topic(name)) for name in SENSED}
+        self._wheels: Publisher[Any] = bus.publisher(interface.topic(COMMANDED))
+        self._newest: dict[str, Any] = {}
+        self._seq = 0
+        self._observation: Observation | None = None
+        self._lock = threading.Lock()  # over the clock and what is sent
+        self._clock = ClockEstimate()
+        self._interlock = Interlock()
+        self._sent, self._sent_s = STOP, 0.0
+
+    @property
+    def profile(self) -> RobotProfile:
+        """The robot's profile: nobody there tells one."""
+        return self._profile
+
+    def open(self) -> None:
+        """Wait until the robot shows what it must. Raises `DeviceError` that names what it does not."""
+        until_s = time.monotonic() + OPEN_S
+        while (lost := self._silent()) and time.monotonic() < until_s:
+            self._listen()
+            time.sleep(LOOK_S)
+        for name in lost:
+            key = self._interface.topic(name).key
+            stamp = getattr(self._newest.get(name), "stamp_s", None)
+            what = f"nothing comes on '{key}'" if stamp is None else f"what comes on '{key}' is stamped {stamp:.1f} s"
+            raise DeviceError(what, BRIDGE if stamp is None else "Its driver has to stamp with the robot's own clock.")
+
+    def read(self) -> Observation:
+        """Return the newest of every sensor; what is older than its topic allows is None."""
+        news = self._listen()
+        now_s = self.now()
+        if self._observation is None or news:
+            self._seq += 1
+        fresh = {name: value for name, value in self._newest.items() if now_s - value.stamp_s <= SENSED[name].max_age_s}
+        self._observation = Observation(
+            self._seq,
+            now_s,
+            scan=fresh.get("scan"),
+            image=fresh.get("camera"),
+            odom=fresh.get("odom"),
+            imu=fresh.get("imu"),
+            battery=fresh.get("battery"),
+        )
+        return self._observation
+
+    def drive(self, command: Command) -> Applied:
+        """Send a velocity, at once if it is new, else at 20 Hz; zero if the robot may not move."""
+        twist, reason, clamps = self._interlock.judge(command.twist, tuple(NEEDED[name] for name in self._silent()))
+        now_s = self.now()
+        with self._lock:
+            due = twist != self._sent or time.monotonic() - self._sent_s >= SEND_S
+            if due:
+                self._send(twist, now_s)
+        source = command.source if reason is Reason.OK else Source.NONE
+        return Applied(twist, now_s, source, reason, clamps, command.answers, now_s - command.stamp_s)
+
+    def now(self) -> float:
+        """Seconds on the robot's ROS clock, late by the shortest way of a message; 0 before there was any."""
+        with self._lock:
+            return self._clock.now(time.monotonic()) if self._clock.known else 0.0
+
+    def wait(self, until_s: float) -> None:
+        """Sleep."""
+        time.sleep(max(until_s - self.now(), 0.0))
+
+    def wait_news(self, until_s: float) -> None:
+        """Sleep a moment: there is nothing to wait for but time."""
+        time.sleep(min(max(until_s - self.now(), 0.0), LOOK_S))
+
+    def close(self) -> None:
+        """Send zero. May be called twice."""
+        with self._lock:
+            for _ in range(FAREWELL):
+                try:
+                    self._send(STOP, self._clock.now(time.monotonic()) if self._clock.known else 0.0)
+                except BusError:
+                    return
+
+    def troubles(self) -> dict[str, str]:
+        """What is missing, each with its remedy."""
+        return {name: f"'{self._interface.topic(name).key}' is silent. {BRIDGE}" for name in self._silent()}
+
+    def _send(self, twist: Twist, now_s: float) -> None:
+        self._sent, self._sent_s = twist, time.monotonic()
+        self._wheels.put(TwistStamped(now_s, twist) if self._interface.stamped else twist, now_s)
+
+    def _listen(self) -> bool:
+        """Take what came; returns whether anything did."""
+        news = False
+        for name, reader in self._readers.items():
+            for received in reader.poll():
+                news = True
+                value = received.message
+                if name in CLOCKS:
+                    with self._lock:
+                        self._clock.note(value.stamp_s, received.arrived_s)
+                if name == "scan":
+                    value = placed_scan(value, self._interface.lidar_yaw_rad)
+                elif name == "camera":
+                    value = plain_picture(value)
+                self._newest[name] = value
+        return news
+
+    def _silent(self) -> list[str]:
+        now_s = self.now()
+        known = ((name, self._newest.get(name)) for name in NEEDED)
+        return [name for name, value in known if value is None or now_s - value.stamp_s > BLIND_S]
