@@ -22,6 +22,7 @@ class Checkpoint:
 
     `cruise` is an expert's measured action (linear, angular) on an empty straight course; `provenance` the command
     that made it. `bins`, `filters` and `px` are the sizes of the sensors' trunks, also for the one that is not used.
+    `labels` and `training_steps` are what it took; None for a file that was written before they were counted.
     """
 
     kind: Kind
@@ -32,6 +33,8 @@ class Checkpoint:
     provenance: str
     seed: int
     px: int = IMAGE_PX
+    labels: int | None = None
+    training_steps: int | None = None
 
 
 def save_checkpoint(path: Path, network: Network, checkpoint: Checkpoint) -> None:

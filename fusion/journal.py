@@ -61,7 +61,7 @@ class Journal:
                 )
             )
         if phase == "train":
-            self.ledger.note(step.lesson, trained=training_steps > 0)
+            self.ledger.note(step.lesson, now_s=step.observation.stamp_s, trained=training_steps > 0)
         decision = self._decision(step, phase, lap, training_steps)
         self._publish(decision)
         risen = choice.call not in (Call.NONE, self._call)

@@ -11,6 +11,7 @@ from typing import Self
 
 import msgspec
 
+from fusion.ledger import Account
 from hal.errors import StorageError
 from hal.messages import CourseState, Decision
 
@@ -116,6 +117,7 @@ class ResultRecord(msgspec.Struct, frozen=True, tag="result"):
     training_steps: int
     simulated_s: float
     elapsed_s: float
+    account: Account = Account()
 
 
 Record = RunRecord | StepRecord | LapRecord | ResultRecord

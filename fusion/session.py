@@ -104,6 +104,7 @@ class Session:
             training_steps=self._apprentice.novice.training_steps,
             simulated_s=self._robot.now() - self._began_s,
             elapsed_s=self._journal.elapsed_s,
+            account=ledger.account,
         )
 
     def _alone(self, drives: Sequence[Drive], phase: str, lap: int) -> LapRecord:

@@ -1,5 +1,6 @@
 """Training an expert in process: the same loop, teacher and session as over the bus."""
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Literal
 
@@ -59,7 +60,8 @@ def train_expert(kind: Literal["camera", "lidar"], profile: RobotProfile, seed: 
         robot.close()
     if passed:
         cruise = measure_cruise(network, profile)
-        save_checkpoint(path, network, Checkpoint(kind, shape.bins, shape.filters, profile.name, cruise, command, seed))
+        about = Checkpoint(kind, shape.bins, shape.filters, profile.name, cruise, command, seed)
+        save_checkpoint(path, network, replace(about, labels=novice.stored, training_steps=novice.training_steps))
         print(f"{kind} expert: {novice.stored} labels, {novice.training_steps} training steps, saved to {path}")
     return passed
 

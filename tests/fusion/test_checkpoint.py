@@ -20,7 +20,7 @@ def checkpoint(kind="fusion", **changes) -> Checkpoint:
 @pytest.mark.parametrize(
     ("network", "about"),
     [
-        (CameraNet(16, seed=1), checkpoint("camera", cruise=(0.98, -0.01))),
+        (CameraNet(16, seed=1), checkpoint("camera", cruise=(0.98, -0.01), labels=270, training_steps=9)),
         (CameraNet(8, px=24, seed=1), checkpoint("camera", filters=8, px=24)),
         (LidarNet(101, seed=2), checkpoint("lidar", provenance='lira train-expert lidar "ä"')),
         (FusionNet(101, 16, seed=3), checkpoint()),

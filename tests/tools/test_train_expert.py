@@ -40,6 +40,7 @@ def test_an_expert_that_passes_is_saved_with_its_cruise_and_how_it_was_made(shor
     network, checkpoint = load_checkpoint(path)
     assert network.kind == checkpoint.kind == "camera"
     assert checkpoint.provenance == "lira train-expert camera --profile thesis-sim --seed 3"
+    assert checkpoint.training_steps == checkpoint.labels // 30 > 0
     assert checkpoint.cruise[0] > 0.5
     assert abs(checkpoint.cruise[1]) < 0.5
     assert "camera expert: " in capsys.readouterr().out
