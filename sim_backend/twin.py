@@ -119,7 +119,7 @@ class Twin:
             last = self._newest
             image, scan = self._sensors.image(motion, now_s), self._sensors.scan(motion, now_s)
             if last is not None:
-                if last.odom is not None and now_s - last.odom.stamp_s < ODOMETRY_PERIOD_S - ROUNDING_S:
+                if last.odom is not None and _periods(now_s) == _periods(last.odom.stamp_s):
                     odom = last.odom
                 stepped = self._factor is None and now_s > last.stamp_s
                 if image is last.image and scan is last.scan and odom is last.odom and not stepped:
@@ -161,6 +161,11 @@ class Twin:
         self._newest = None
         if self._sensors is not None:
             self._sensors.forget()
+
+
+def _periods(time_s: float) -> int:
+    """How many periods of the odometry have begun: a reader that a picture held up does not slow it down."""
+    return math.floor((time_s + ROUNDING_S) / ODOMETRY_PERIOD_S)
 
 
 def judge_command(command: Command, base: Base, stamp_s: float) -> Applied:
