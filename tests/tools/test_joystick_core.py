@@ -27,6 +27,8 @@ def test_the_ps3_pad_is_known_and_complete():
     [
         ('turbo = "BTN_TL"', "different buttons"),
         ('turbo = "BTN_NOSUCH"', "no button named BTN_NOSUCH"),
+        ('pause = "BTN_TL"', "different buttons"),
+        ('experts = ["BTN_NOSUCH"]', "no button named BTN_NOSUCH"),
         ('turn = { axis = "ABS_NOSUCH" }', "no axis named ABS_NOSUCH"),
         ('turn = { axis = "ABS_Y" }', "different axes"),
         ("expo = 2.0", "expo"),
