@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 FloatArray = NDArray[np.float32]
 ByteArray = NDArray[np.uint8]
+WordArray = NDArray[np.uint16]
 
 
 @dataclass(frozen=True, slots=True)
@@ -191,6 +192,17 @@ class Image:
 
 
 @dataclass(frozen=True, slots=True)
+class DepthImage:
+    """sensor_msgs/Image of encoding 16UC1. `data`: uint16 [height, width], millimetres along the optical axis, 0: none.
+
+    It travels as a PNG of 16 bits.
+    """
+
+    stamp_s: float
+    data: WordArray
+
+
+@dataclass(frozen=True, slots=True)
 class CompressedImage:
     """sensor_msgs/CompressedImage. `format` is "jpeg" or "png"."""
 
@@ -263,6 +275,7 @@ class Observation:
     imu: Imu | None = None
     battery: BatteryState | None = None
     ranges: tuple[Range, ...] = field(default=())
+    depth: DepthImage | None = None
 
 
 @dataclass(frozen=True, slots=True)

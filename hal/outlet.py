@@ -1,5 +1,6 @@
 """What a HAL server sends: sensors when they are new, images compressed."""
 
+import math
 from collections.abc import Iterator
 from typing import Any
 
@@ -8,19 +9,20 @@ import numpy as np
 
 from hal.bus import Bus, Publisher
 from hal.errors import SensorError
-from hal.messages import CompressedImage, Image, Observation
+from hal.messages import CompressedImage, DepthImage, Image, Observation
 from hal.profile import Camera
-from hal.topics import BATTERY, CAMERA, IMU, LOCKSTEP, ODOM, RANGES, SCAN, Qos, Topic
+from hal.topics import BATTERY, CAMERA, DEPTH, IMU, LOCKSTEP, ODOM, RANGES, SCAN, Qos, Topic
 
 # Over it, an image holds up its publisher for 50 ms on a slow link before it is dropped.
 IMAGE_LIMIT_BYTES = 64_000
 JPEG_QUALITIES = (90, 75, 50, 25)
+DEPTH_STEPS = (1, 2, 4)  # every so many pixels of every so many rows
 
 
 class Outlet:
     """Publishes the parts of observations. With `lockstep` all of them each time, else only those that are new.
 
-    Images are left to the caller: they are slow, and may be sent from a thread of their own.
+    Images and depths are left to the caller: they are slow, and may be sent from a thread of their own.
     """
 
     def __init__(self, bus: Bus, camera: Camera, *, lockstep: bool) -> None:
@@ -32,11 +34,17 @@ class Outlet:
         topics: list[Topic[Any]] = [SCAN, ODOM, IMU, BATTERY, *RANGES.values()]
         self._publishers: dict[str, Publisher[Any]] = {t.key: bus.publisher(t, self._qos) for t in topics}
         self._images = bus.publisher(CAMERA, self._qos)
+        self._depths = bus.publisher(DEPTH, self._qos)
 
     @property
     def image_wanted(self) -> bool:
         """Whether anybody listens to the camera."""
         return self._images.matching
+
+    @property
+    def depth_wanted(self) -> bool:
+        """Whether anybody listens to the depth camera."""
+        return self._depths.matching
 
     def put(self, observation: Observation, now_s: float) -> None:
         """Publish everything but the image."""
@@ -54,6 +62,14 @@ class Outlet:
         self._sent_s[CAMERA.key] = image.stamp_s
         compressed = compress(image, self._camera.encoding) if isinstance(image, Image) else image
         self._images.put(compressed, now_s, seq=observation.seq)
+
+    def put_depth(self, observation: Observation, now_s: float) -> None:
+        """Publish the depth image, if it is time for one."""
+        depth = observation.depth
+        if depth is None or depth.stamp_s - self._sent_s.get(DEPTH.key, -math.inf) < 1.0 / DEPTH.rate_hz:
+            return
+        self._sent_s[DEPTH.key] = depth.stamp_s
+        self._depths.put(compress_depth(depth), now_s, seq=observation.seq)
 
 
 def _parts(observation: Observation) -> Iterator[tuple[Topic[Any], Any]]:
@@ -77,6 +93,15 @@ def compress(image: Image, encoding: str) -> CompressedImage:
         if len(data) <= IMAGE_LIMIT_BYTES:
             break
     return CompressedImage(image.stamp_s, data, "jpeg")
+
+
+def compress_depth(depth: DepthImage) -> CompressedImage:
+    """Compress to a PNG of 16 bits that fits the limit. Pixels are left out, never mixed: 0 is no distance."""
+    for step in DEPTH_STEPS:
+        data = _encode(".png", depth.data[::step, ::step], [cv2.IMWRITE_PNG_COMPRESSION, 1])
+        if len(data) <= IMAGE_LIMIT_BYTES:
+            break
+    return CompressedImage(depth.stamp_s, data, "png")
 
 
 def _encode(extension: str, pixels: Any, options: list[int]) -> bytes:

@@ -115,11 +115,14 @@ class ImageLoop:
             with self._offered:
                 self._offered.wait_for(lambda: self._newest is not None, timeout=JOIN_S / 4)
                 observation, self._newest = self._newest, None
-            if observation is not None and self._outlet.image_wanted:
+            if observation is not None:
                 self._send(observation)
 
     def _send(self, observation: Observation) -> None:
         try:
-            self._outlet.put_image(observation, self._robot.now())
+            if self._outlet.image_wanted:
+                self._outlet.put_image(observation, self._robot.now())
+            if self._outlet.depth_wanted:
+                self._outlet.put_depth(observation, self._robot.now())
         except SensorError:
             self.refused += 1

@@ -72,6 +72,7 @@ class Topic(Generic[M]):
 
 SCAN = Topic("scan", LaserScan, 10.0, 0.3, SENSOR)
 CAMERA = Topic("camera/color/image_raw/compressed", CompressedImage, 30.0, 0.3, PICTURE)
+DEPTH = Topic("camera/depth/image_raw/compressed", CompressedImage, 5.0, 0.6, PICTURE)  # for whoever asks
 ODOM = Topic("odom", Odometry, 20.0, 0.3, URGENT)
 IMU = Topic("imu", Imu, 10.0, 0.3, SENSOR)
 RANGES = {
@@ -95,6 +96,7 @@ CLOCK = Topic("clock", Clock, 20.0, 0.3, URGENT)  # lockstep only: closes an obs
 TOPICS: tuple[Topic[Any], ...] = (
     SCAN,
     CAMERA,
+    DEPTH,
     ODOM,
     IMU,
     *RANGES.values(),

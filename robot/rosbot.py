@@ -7,10 +7,10 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 from hal.errors import ConfigError, DeviceError
-from hal.messages import STOP, Applied, Command, LaserScan, Observation, Reason, Source
+from hal.messages import STOP, Applied, Command, DepthImage, LaserScan, Observation, Reason, Source
 from hal.profile import RobotProfile
 from hal.senses import Stamped
-from hal.topics import BATTERY, CAMERA, IMU, ODOM, RANGES, SCAN, Topic
+from hal.topics import BATTERY, CAMERA, DEPTH, IMU, ODOM, RANGES, SCAN, Topic
 from robot.camera.device import CameraDevice
 from robot.camera.source import Picture
 from robot.core2.device import Core2
@@ -47,6 +47,7 @@ class Rosbot:
         self._profile = profile
         self._scan: LaserScan | None = None
         self._picture: Picture | None = None
+        self._depth: DepthImage | None = None
         self._newest: Observation | None = None
         self._news = threading.Event()  # a scan or a picture; the base is read often enough
         self._interlock = Interlock()
@@ -58,7 +59,8 @@ class Rosbot:
             self.lidar = RPLidar(devices.lidar, profile.lidar, devices.settings.lidar, self._see_scan)
             self._keepers["lidar"] = Keeper("lidar", self.lidar.session)
         if devices.camera is not None:
-            camera = CameraDevice(devices.camera, profile.camera, self._see_picture, devices.openni_folder)
+            depth = devices.settings.camera.depth
+            camera = CameraDevice(devices.camera, profile.camera, self._see_picture, devices.openni_folder, depth=depth)
             self._keepers["camera"] = Keeper("camera", camera.session)
 
     @property
@@ -94,6 +96,7 @@ class Rosbot:
             imu=fresh_of(readings.imu, IMU, now_s),
             battery=fresh_of(readings.battery, BATTERY, now_s),
             ranges=tuple(value for value in ranges if value is not None),
+            depth=fresh_of(self._depth, DEPTH, now_s),
         )
         if last is not None and same(observation, last):
             return last
@@ -158,8 +161,11 @@ class Rosbot:
         self._scan = scan
         self._news.set()
 
-    def _see_picture(self, picture: Picture) -> None:
-        self._picture = picture
+    def _see_picture(self, picture: Picture | DepthImage) -> None:
+        if isinstance(picture, DepthImage):
+            self._depth = picture
+        else:
+            self._picture = picture
         self._news.set()
 
 
@@ -170,6 +176,6 @@ def fresh_of(value: S | None, topic: Topic[Any], now_s: float) -> S | None:
 
 def same(one: Observation, other: Observation) -> bool:
     """Whether two observations hold the very same readings."""
-    names = ("scan", "image", "odom", "imu", "battery")
+    names = ("scan", "image", "odom", "imu", "battery", "depth")
     mine, theirs = ([*(getattr(seen, name) for name in names), *seen.ranges] for seen in (one, other))
     return len(mine) == len(theirs) and all(a is b for a, b in zip(mine, theirs, strict=True))

@@ -37,11 +37,18 @@ class BaseSettings(Table, frozen=True):
     boot_s: Seconds = 2.0  # after the line is opened
 
 
+class CameraSettings(Table, frozen=True):
+    """The camera. `depth`: grab its depth, too; only OpenNI2 cameras have any."""
+
+    depth: bool = False
+
+
 class Settings(Table, frozen=True):
     """All of them."""
 
     lidar: LidarSettings = LidarSettings()
     base: BaseSettings = BaseSettings()
+    camera: CameraSettings = CameraSettings()
 
 
 def load_settings(path: Path | None) -> Settings:

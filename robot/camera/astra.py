@@ -1,4 +1,4 @@
-"""The Orbbec Astra's colour camera through OpenNI2."""
+"""The Orbbec Astra's colour and depth cameras through OpenNI2."""
 
 import contextlib
 import time
@@ -11,7 +11,8 @@ from openni import openni2
 from openni.utils import ClosedHandle, InitializationError, OpenNIError
 
 from hal.errors import DeviceError
-from hal.messages import Image
+from hal.messages import DepthImage, Image
+from hal.topics import DEPTH
 
 # A driver's own thread may still be at its last picture when the stream has stopped; to close it then crashes.
 SETTLE_S = 0.15
@@ -33,48 +34,79 @@ class Device(openni2.Device):  # type: ignore[misc]
 
 
 class OpenniSource:
-    """Colour of the OpenNI2 device `uri`, or of the first there is if that is empty. Raises `DeviceError`."""
+    """Colour, and depth if wanted, of the OpenNI2 device `uri`, or of the first there is if that is empty.
 
-    def __init__(self, uri: str, size: tuple[int, int], folder: Path | None) -> None:
+    Raises `DeviceError`.
+    """
+
+    def __init__(self, uri: str, size: tuple[int, int], folder: Path | None, *, depth: bool = False) -> None:
         self._device: Any = None
-        self._stream: Any = None
+        self._colour: Any = None
+        self._depth: Any = None
+        self._depth_due_s = 0.0
         load(folder)
         try:
             self._device = Device(uri.encode() or None)
-            self._stream = self._device.create_color_stream()
-            if self._stream is None:
-                raise DeviceError(f"the OpenNI2 device {name_of(self._device)} has no colour", PLUG)
-            modes = self._stream.get_sensor_info().videoModes
-            if len(modes) > 1:  # with a single one there may be nothing to set
-                self._stream.set_video_mode(best_mode(modes, size))
-            self._stream.start()
+            self._colour = self._open_stream("colour", self._device.create_color_stream, colour_modes, size)
+            if depth:
+                self._depth = self._open_stream("depth", self._device.create_depth_stream, depth_modes, size)
         except OpenNIError as error:
             self.close()
             raise DeviceError(f"no camera opens through OpenNI2: {words(error)}", PLUG) from error
+        except DeviceError:
+            self.close()
+            raise
 
-    def grab(self, timeout_s: float) -> Image | None:
-        """Return the newest picture, rgb8."""
+    def grab(self, timeout_s: float) -> Image | DepthImage | None:
+        """Return the newest picture, rgb8, or the newest depth."""
+        streams = [stream for stream in (self._colour, self._depth) if stream is not None]
         try:
-            if openni2.wait_for_any_stream([self._stream], timeout_s) is None:
+            ready = openni2.wait_for_any_stream(streams, timeout_s)
+            if ready is None:
                 return None
             stamp_s = time.monotonic()
-            frame = self._stream.read_frame()
+            frame = ready.read_frame()
         except OpenNIError as error:
             raise DeviceError(f"the camera was lost: {words(error)}", PLUG) from error
-        flat = np.frombuffer(frame.get_buffer_as_uint8(), np.uint8)
-        rows = flat.reshape(frame.height, frame.stride)[:, : frame.width * 3]
-        return Image(stamp_s, rows.reshape(frame.height, frame.width, 3).copy())
+        if ready is not self._depth:
+            flat = np.frombuffer(frame.get_buffer_as_uint8(), np.uint8)
+            rows = flat.reshape(frame.height, frame.stride)[:, : frame.width * 3]
+            return Image(stamp_s, rows.reshape(frame.height, frame.width, 3).copy())
+        if stamp_s < self._depth_due_s:
+            return None
+        self._depth_due_s = stamp_s + 0.5 / DEPTH.rate_hz
+        words_of_row = frame.stride // 2
+        depths = np.frombuffer(frame.get_buffer_as_uint16(), np.uint16).reshape(frame.height, words_of_row)
+        return DepthImage(stamp_s, depths[:, : frame.width].copy())
 
     def close(self) -> None:
         """Let go of the camera. The library stays loaded."""
-        stream, device, self._stream, self._device = self._stream, self._device, None, None
-        if stream is not None:
+        streams = [stream for stream in (self._colour, self._depth) if stream is not None]
+        device, self._device, self._colour, self._depth = self._device, None, None, None
+        for stream in streams:
             quietly(stream.stop)
+        if streams:
             time.sleep(SETTLE_S)
+        for stream in streams:
             quietly(stream.close)
+        if streams:
             time.sleep(SETTLE_S)
         if device is not None:
             quietly(device.close)
+
+    def _open_stream(
+        self, what: str, create: Callable[[], Any], usable: Callable[[Any], list[Any]], size: tuple[int, int]
+    ) -> Any:
+        stream = create()
+        if stream is None:
+            raise DeviceError(f"the OpenNI2 device {name_of(self._device)} has no {what}", PLUG)
+        modes = usable(stream.get_sensor_info().videoModes)
+        if not modes:
+            raise DeviceError(f"the OpenNI2 device {name_of(self._device)} has no {what} that is understood", PLUG)
+        if len(modes) > 1:  # with a single one there may be nothing to set
+            stream.set_video_mode(best_mode(modes, size))
+        stream.start()
+        return stream
 
 
 def quietly(end: Callable[[], object]) -> None:
@@ -92,16 +124,23 @@ def load(folder: Path | None) -> None:
         raise DeviceError(f"OpenNI2 does not load: {why}", INSTALL) from error
 
 
-def best_mode(modes: Any, size: tuple[int, int]) -> Any:
-    """Choose the RGB mode nearest to (width, height), of these the fastest up to 30 Hz."""
-    colour = [mode for mode in modes if mode.pixelFormat == openni2.PIXEL_FORMAT_RGB888]
-    if not colour:
-        raise DeviceError("the camera offers no RGB", PLUG)
+def colour_modes(modes: Any) -> list[Any]:
+    """Those that give RGB."""
+    return [mode for mode in modes if mode.pixelFormat == openni2.PIXEL_FORMAT_RGB888]
+
+
+def depth_modes(modes: Any) -> list[Any]:
+    """Those that give millimetres."""
+    return [mode for mode in modes if mode.pixelFormat == openni2.PIXEL_FORMAT_DEPTH_1_MM]
+
+
+def best_mode(modes: list[Any], size: tuple[int, int]) -> Any:
+    """Choose the mode nearest to (width, height), of these the fastest up to 30 Hz."""
 
     def distance(mode: Any) -> tuple[int, int]:
         return abs(mode.resolutionX - size[0]) + abs(mode.resolutionY - size[1]), abs(mode.fps - 30)
 
-    return min(colour, key=distance)
+    return min(modes, key=distance)
 
 
 def name_of(device: Any) -> str:

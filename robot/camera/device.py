@@ -9,7 +9,7 @@ import cv2
 import numpy as np
 
 from hal.errors import DeviceError
-from hal.messages import CompressedImage
+from hal.messages import CompressedImage, DepthImage
 from hal.profile import Camera
 from robot.camera.source import Picture, Source, open_source
 
@@ -21,21 +21,30 @@ QUALITIES = (75, 50, 25, 10)
 
 
 class CameraDevice:
-    """Hands each picture of the source at `url` to `put`. `session` is for a `Keeper`.
+    """Hands each picture of the source at `url` to `put`, and with `depth` each depth. `session` is for a `Keeper`.
 
     Pixels are handed on as they are: the HAL server makes JPEGs of them in a thread of its own, if anybody listens.
     """
 
-    def __init__(self, url: str, camera: Camera, put: Callable[[Picture], None], openni_folder: Path | None) -> None:
+    def __init__(
+        self,
+        url: str,
+        camera: Camera,
+        put: Callable[[Picture | DepthImage], None],
+        openni_folder: Path | None,
+        *,
+        depth: bool = False,
+    ) -> None:
         self._url = url
         self._size = (camera.width_px, camera.height_px)
         self._put = put
         self._folder = openni_folder
+        self._depth = depth
         self.pictures = 0
 
     def session(self, stop: threading.Event, begin: Callable[[], None]) -> None:
         """Open, grab until `stop` is set or the camera is lost, and let go. Raises `DeviceError`."""
-        source = open_source(self._url, self._size, self._folder)
+        source = open_source(self._url, self._size, self._folder, depth=self._depth)
         try:
             self._grab(source, stop, begin)
         finally:
@@ -46,13 +55,15 @@ class CameraDevice:
         while not stop.is_set():
             picture = source.grab(GRAB_S)
             now_s = time.monotonic()
-            if picture is not None:
+            if isinstance(picture, DepthImage):
+                self._put(picture)
+            elif picture is not None:
                 self._put(shrink(picture) if isinstance(picture, CompressedImage) else picture)
                 self.pictures += 1
                 if patience_s == FIRST_S:
                     begin()
                 heard_s, patience_s = now_s, SILENCE_S
-            elif now_s - heard_s > patience_s:
+            if now_s - heard_s > patience_s:
                 raise DeviceError(f"the camera at {self._url} sends no pictures", "Check its power, plug and network.")
 
 

@@ -5,7 +5,7 @@ from typing import Protocol
 from urllib.parse import urlsplit
 
 from hal.errors import ConfigError
-from hal.messages import CompressedImage, Image
+from hal.messages import CompressedImage, DepthImage, Image
 
 Picture = Image | CompressedImage
 
@@ -13,8 +13,8 @@ Picture = Image | CompressedImage
 class Source(Protocol):
     """Something that takes pictures. It is used by one thread, and every call comes back in time."""
 
-    def grab(self, timeout_s: float) -> Picture | None:
-        """Return the newest picture with its time of capture on the monotonic clock; None after the time.
+    def grab(self, timeout_s: float) -> Picture | DepthImage | None:
+        """Return the newest picture, or depth, with its time of capture on the monotonic clock; None after the time.
 
         Raises `DeviceError` when the source is lost.
         """
@@ -23,17 +23,19 @@ class Source(Protocol):
         """Let go of it. May be called twice."""
 
 
-def open_source(url: str, size: tuple[int, int], openni_folder: Path | None) -> Source:
+def open_source(url: str, size: tuple[int, int], openni_folder: Path | None, *, depth: bool = False) -> Source:
     """Open `openni:`, `http(s)://` (MJPEG), `rtsp://`, `/dev/video0` or a folder of images.
 
     `size` (width, height) is asked of sources that have a choice. Raises `DeviceError`, or `ConfigError` for a URL of
-    none of these forms.
+    none of these forms, or one of a source that has no `depth`.
     """
     scheme = urlsplit(url).scheme
+    if depth and scheme != "openni":
+        raise ConfigError(f"'{url}' has no depth", "Take depth = true out of the settings, or use openni:.")
     if scheme == "openni":
         from robot.camera.astra import OpenniSource
 
-        return OpenniSource(url.removeprefix("openni:"), size, openni_folder)
+        return OpenniSource(url.removeprefix("openni:"), size, openni_folder, depth=depth)
     if scheme in ("http", "https"):
         from robot.camera.mjpeg import MjpegSource
 

@@ -5,8 +5,8 @@ import numpy as np
 import pytest
 
 from hal.errors import SensorError
-from hal.messages import Image
-from hal.outlet import IMAGE_LIMIT_BYTES, compress
+from hal.messages import DepthImage, Image
+from hal.outlet import IMAGE_LIMIT_BYTES, compress, compress_depth
 
 RNG = np.random.default_rng(1)
 
@@ -37,3 +37,16 @@ def test_jpeg_keeps_below_the_limit_even_for_noise():
 def test_what_is_no_image_is_a_sensor_error():
     with pytest.raises(SensorError, match="shape"):
         compress(Image(1.0, np.zeros((0, 0, 3), np.uint8)), "jpeg")
+
+
+def test_a_depth_image_fits_and_no_distance_stays_no_distance():
+    noise = np.random.default_rng(0).integers(0, 8000, (480, 640)).astype(np.uint16)
+    noise[::2, ::3] = 0
+    sent = compress_depth(DepthImage(1.0, noise))
+    assert len(sent.data) <= IMAGE_LIMIT_BYTES
+    seen = cv2.imdecode(np.frombuffer(sent.data, np.uint8), cv2.IMREAD_UNCHANGED)
+    assert seen.dtype == np.uint16
+    assert np.array_equal(seen, noise[:: 480 // seen.shape[0], :: 640 // seen.shape[1]])
+    flat = DepthImage(1.0, np.full((480, 640), 1234, np.uint16))
+    seen = cv2.imdecode(np.frombuffer(compress_depth(flat).data, np.uint8), cv2.IMREAD_UNCHANGED)
+    assert np.array_equal(seen, flat.data)

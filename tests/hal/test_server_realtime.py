@@ -2,7 +2,10 @@
 
 import threading
 import time
+from dataclasses import replace
 
+import cv2
+import numpy as np
 import pytest
 import zenoh
 from wiring import PROFILE, joined, new_endpoint, new_name, real_time_null, remote, served, wait_for
@@ -11,13 +14,13 @@ from hal.bus import Bus
 from hal.codec import encode
 from hal.errors import BusError, DeviceError
 from hal.governed import GovernedRobot
-from hal.messages import STOP, Command, Reason, Source, Twist
+from hal.messages import STOP, Command, DepthImage, Reason, Source, Twist
 from hal.null import NullRobot
 from hal.profile import STOP_BUDGET_S
 from hal.remote import RemoteRobot
 from hal.remote_realtime import DECISION_S
 from hal.server import HalServer
-from hal.topics import APPLIED, CMD_VEL
+from hal.topics import APPLIED, CMD_VEL, DEPTH
 
 GO = Twist(0.5, 0.0)
 
@@ -183,3 +186,24 @@ def test_nobody_there_is_said_with_the_remedy():
 def test_the_profile_comes_over_the_bus():
     with served(real_time_null()) as robot, remote(robot) as client:
         assert client.profile == PROFILE
+
+
+class Deep(NullRobot):
+    """A null robot whose camera sees a wall at 1.5 m, too."""
+
+    def read(self):
+        seen = super().read()
+        return replace(seen, depth=DepthImage(seen.stamp_s, np.full((12, 16), 1500, np.uint16)))
+
+
+def test_depth_travels_at_its_own_rate_and_only_to_who_asks():
+    with served(real_time_null(Deep)) as robot, joined(robot) as bus:
+        reader = bus.reader(DEPTH, depth=64)
+        wait_for(lambda: reader.newest() is not None)
+        reader.poll()
+        time.sleep(1.0)
+        came = reader.poll()
+        assert 3 <= len(came) <= 6
+        pixels = cv2.imdecode(np.frombuffer(came[-1].message.data, np.uint8), cv2.IMREAD_UNCHANGED)
+        assert pixels.dtype == np.uint16
+        assert np.unique(pixels).tolist() == [1500]

@@ -8,11 +8,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from hal.errors import ConfigError, DeviceError
-from hal.messages import CompressedImage, Image
+from hal.messages import CompressedImage, DepthImage, Image
 from hal.profile import load_profile
 from robot.camera.device import LIMIT_BYTES, CameraDevice, shrink
 from robot.camera.mjpeg import parse_parts
 from robot.camera.source import open_source
+from robot.camera.video import VideoSource
 from robot.keeper import Keeper
 from sim_backend.emulators.camera import MjpegServer
 
@@ -31,9 +32,9 @@ def jpeg(gray, size=(64, 48), noise=0.0):
 class Watch:
     """A camera device on a source."""
 
-    def __init__(self, url, openni=None):
-        self.pictures = []
-        self.device = CameraDevice(url, CAMERA, self.pictures.append, openni)
+    def __init__(self, url, openni=None, depth=False):
+        self.pictures, self.depths = [], []
+        self.device = CameraDevice(url, CAMERA, self.put, openni, depth=depth)
         self.keeper = Keeper("camera", self.device.session)
 
     def __enter__(self):
@@ -42,6 +43,9 @@ class Watch:
 
     def __exit__(self, *_):
         self.keeper.close()
+
+    def put(self, picture):
+        (self.depths if isinstance(picture, DepthImage) else self.pictures).append(picture)
 
     def wait(self, count, timeout_s=6.0):
         until_s = time.monotonic() + timeout_s
@@ -179,6 +183,66 @@ def test_openni_takes_pictures_and_can_be_opened_again(openni):
         assert not np.array_equal(first.data, last.data)  # its ball moves
         periods_s = np.diff([picture.stamp_s for picture in watch.pictures])
         assert 0.01 < np.median(periods_s) < 0.1
+
+
+def test_openni_gives_depth_beside_the_pictures_and_it_can_be_opened_again(openni):
+    for _ in range(2):
+        with Watch("openni:Dummy", openni, depth=True) as watch:
+            watch.wait(30)
+        assert 3 <= len(watch.depths) <= 20  # ten a second: it travels at five
+        depth = watch.depths[-1]
+        assert depth.data.shape == (240, 320)
+        assert depth.data.dtype == np.uint16
+        assert 0 < depth.data.max() <= 10_000  # millimetres
+        assert watch.pictures[-1].data.shape == (240, 320, 3)
+
+
+def test_a_camera_that_is_lost_is_opened_again_with_its_depth(openni, monkeypatch):
+    with Watch("openni:Dummy", openni, depth=True) as watch:
+        watch.wait(3)
+        monkeypatch.setattr("robot.camera.astra.openni2.wait_for_any_stream", lambda *_: None)  # it says no more
+        until_s = time.monotonic() + 3.0
+        while watch.keeper.alive:
+            assert time.monotonic() < until_s
+            time.sleep(0.01)
+        assert "sends no pictures" in str(watch.keeper.failure)
+        monkeypatch.undo()
+        depths = len(watch.depths)
+        watch.wait(len(watch.pictures) + 10)
+        assert len(watch.depths) > depths
+
+
+def test_depth_of_a_camera_that_has_none_is_refused(tmp_path):
+    with pytest.raises(ConfigError, match="has no depth"):
+        open_source(str(tmp_path), (640, 480), None, depth=True)
+
+
+@pytest.fixture
+def film(tmp_path):
+    """A file that OpenCV reads as it reads a UVC camera: 20 pictures, red at first and then blue."""
+    path = tmp_path / "film.avi"
+    writer = cv2.VideoWriter(str(path), cv2.VideoWriter_fourcc(*"MJPG"), 30.0, (64, 48))
+    for i in range(20):
+        writer.write(np.full((48, 64, 3), (0, 0, 200) if i < 10 else (200, 0, 0), np.uint8))
+    writer.release()
+    return path
+
+
+def test_video_is_read_picture_by_picture_red_first_and_its_end_is_a_loss_that_is_mended(film, monkeypatch):
+    opened = []
+
+    def open_film(*_, **__):
+        opened.append(VideoSource(str(film), (64, 48)))
+        return opened[-1]
+
+    monkeypatch.setattr("robot.camera.device.open_source", open_film)
+    with Watch("/dev/video0") as watch:
+        watch.wait(25)
+    assert len(opened) >= 2
+    first, last = watch.pictures[0], watch.pictures[19]
+    assert first.data.shape == (48, 64, 3)
+    assert np.abs(first.data.reshape(-1, 3).mean(axis=0) - [200, 0, 0]).max() < 12
+    assert np.abs(last.data.reshape(-1, 3).mean(axis=0) - [0, 0, 200]).max() < 12
 
 
 def test_without_a_camera_or_the_library_openni_says_what_to_do(openni):
