@@ -5,7 +5,11 @@ import time
 
 from hal.bus import Bus
 from hal.messages import STOP, Command, Reason, Twist
+from hal.profile import load_profile
 from hal.remote import RemoteRobot
+from sim_backend.emulators.bench import WiredTwin
+from sim_backend.emulators.core2 import Firmware
+from sim_backend.twin import Twin
 from tools.processes import ChildProcess, free_port, lira_command
 
 
@@ -16,6 +20,7 @@ def lira(*words, block=()):
     return subprocess.run([sys.executable, "-c", code], check=False, capture_output=True, text=True, timeout=60)
 
 
+GO = Twist(0.3, 0.0)
 NOT_ON_THE_ROBOT = ["torch", "pybullet", "pygame", "safetensors", "matplotlib"]
 
 
@@ -78,3 +83,49 @@ def test_the_twin_behind_its_devices_is_driven_over_the_bus(tmp_path):
             assert (moved, seen) == (True, {"scan", "image", "odom", "imu"})
             assert server.stop() == 0
     assert not list(folder.iterdir())
+
+
+def test_the_lidars_plug_pulled_mid_drive_stops_it_within_half_a_second_and_it_resumes_when_rearmed(tmp_path):
+    port = free_port()
+    name, endpoint, folder = f"plug_{port}", f"127.0.0.1:{port}", tmp_path / "wire"
+    (tmp_path / "quick.toml").write_text("[lidar]\nspin_up_s = 0.0\n[base]\nboot_s = 0.2\n")
+    wired = WiredTwin(
+        Twin(load_profile("thesis-sim"), "line", realtime_factor=1.0), folder, firmware=Firmware(boot_s=0.1)
+    )
+    words = ["--lidar", str(folder / "rplidar"), "--base", str(folder / "core2"), "--camera", wired.url]
+    words += ["--settings", str(tmp_path / "quick.toml"), "--profile", "thesis-sim"]
+    command = lira_command("robot", *words, "--name", name, "--listen", endpoint)
+    try:
+        with ChildProcess("the robot", command, tmp_path / "robot.log") as server:
+            server.wait_ready("serves", 60.0)
+            bus = Bus(name, connect=endpoint)
+            robot = RemoteRobot(bus)
+            robot.open()
+            drive(robot, STOP, lambda applied: applied.reason is Reason.OK)
+            drive(robot, GO, lambda _: wired.state().linear_m_s > 0.1)
+            wired.lidar_wire.unplug()
+            pulled_s = time.monotonic()
+            drive(robot, GO, lambda _: wired.state().linear_m_s == 0.0)
+            assert time.monotonic() - pulled_s < 0.5
+            assert drive(robot, GO, lambda applied: "no_lidar" in applied.clamps).reason is Reason.STALE
+            server.wait_ready("the robot stands: ", 2.0)
+            wired.lidar_wire.plug()
+            drive(robot, GO, lambda applied: applied.reason is Reason.NEUTRAL_FIRST, 15.0)
+            server.wait_ready("the lidar is back; the robot moves again after a zero command", 2.0)
+            assert wired.state().linear_m_s == 0.0
+            drive(robot, STOP, lambda applied: applied.reason is Reason.OK)
+            drive(robot, GO, lambda _: wired.state().linear_m_s > 0.1)
+            robot.close()
+            assert bus.close()
+            assert server.stop() == 0
+    finally:
+        wired.close()
+
+
+def drive(robot, twist, wanted, timeout_s=5.0):
+    """Command until what is wanted happens; returns the last of what was applied."""
+    until_s = time.monotonic() + timeout_s
+    while not wanted(applied := robot.drive(Command(twist, robot.now()))):
+        assert time.monotonic() < until_s, applied
+        time.sleep(0.01)
+    return applied
