@@ -46,6 +46,7 @@ def head(run: Run, title: str) -> str:
             f"preset {run.head.preset}",
             f"layout {run.head.layout}",
             f"seed {run.head.seed}",
+            f"idle frames: {run.head.idle_frames}",
             f"version {run.head.version}",
         ]
         parts.append(f'<p class="muted">{escape(" · ".join(facts))}</p>')
