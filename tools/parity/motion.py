@@ -26,7 +26,7 @@ def settled(recording: Recording, name: str) -> float | None:
     """Mean speed over the end of a step, with its sign; None if the odometry says nothing then."""
     times_s, values = speeds(recording, name)
     end_s = recording.span(name).ended_s
-    late = values[(times_s > end_s - SETTLED_S) & (times_s <= end_s)]
+    late = values[(times_s > end_s - SETTLED_S) & (times_s < end_s)]
     return float(late.mean()) if late.size else None
 
 
@@ -61,9 +61,7 @@ def way(recording: Recording, name: str) -> float | None:
 def turned_by_imu(recording: Recording, name: str) -> float | None:
     """Mean turn rate over the end of a step, rad/s, as the gyroscope has it; None without one."""
     end_s = recording.span(name).ended_s
-    late = [
-        heard.message.angular_rad_s for heard in recording.imu if end_s - SETTLED_S < heard.message.stamp_s <= end_s
-    ]
+    late = [heard.message.angular_rad_s for heard in recording.imu if end_s - SETTLED_S < heard.message.stamp_s < end_s]
     return float(np.mean(late)) if late else None
 
 

@@ -8,7 +8,7 @@ from hal.bus import Bus, Reader
 from hal.clock import ClockEstimate
 from hal.desk import LOCKSTEP, info_from_json
 from hal.errors import BusError, ConfigError
-from hal.messages import STOP, Applied, CompressedImage, Imu, LaserScan, Odometry, Reason
+from hal.messages import STOP, Applied, CompressedImage, Imu, LaserScan, Odometry, Reason, Source
 from hal.profile import RobotProfile
 from hal.senses import Stamped
 from hal.topics import APPLIED, CAMERA, CMD_VEL, IMU, INFO, ODOM, SCAN
@@ -81,6 +81,7 @@ def record(bus: Bus, name: str) -> Recording:
 class _Driver:
     def __init__(self, bus: Bus, recording: Recording) -> None:
         self.recording = recording
+        self._epoch = bus.epoch
         self._commands = bus.publisher(CMD_VEL)
         self._clock = ClockEstimate()
         self._readers: list[tuple[Reader[Any], list[Any]]] = [
@@ -121,13 +122,19 @@ class _Driver:
 
     def _arms(self) -> bool:
         self._commands.put(STOP, self.now())
-        applied = self.recording.applied
-        return bool(applied) and applied[-1].message.reason is Reason.OK
+        return self._obeys()
+
+    def _obeys(self) -> bool:
+        """Whether the robot said last that it drives on these commands."""
+        if not self.recording.applied:
+            return False
+        newest = self.recording.applied[-1].message
+        return newest.reason is Reason.OK and (newest.source, newest.epoch) == (Source.POLICY, self._epoch)
 
     def _check(self, phase: Phase) -> None:
         """Raise if the robot did something else in the end."""
-        applied = self.recording.applied[-1].message if self.recording.applied else None
-        if applied is None or applied.reason is not Reason.OK:
+        if not self._obeys():
+            applied = self.recording.applied[-1].message if self.recording.applied else None
             why = "nothing" if applied is None else ", ".join([applied.reason.value, *applied.clamps])
             raise BusError(
                 f"'{self.recording.name}' did not do '{phase.name}' to the end; it says: {why}",

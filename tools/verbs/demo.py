@@ -45,7 +45,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add("--seed", type=natural, default=0, help="seeds teacher, training and noise (default: %(default)s)")
     add("--layout", type=natural, default=0, help="layout to learn on (default: %(default)s)")
     add("--laps", type=natural, default=12, help="give up after so many training laps (default: %(default)s)")
-    add("--unseen", type=natural, help="unseen layouts to drive afterwards (default: 3, with --wire 1)")
+    add("--unseen", type=natural, default=3, help="unseen layouts to drive afterwards (default: %(default)s)")
     add(
         "--wire",
         action="store_true",
@@ -76,9 +76,8 @@ def run(args: argparse.Namespace) -> int:
     name, endpoint = f"demo_{port}", f"127.0.0.1:{port}"
     both = ["--layout", str(args.layout), "--seed", str(args.seed)]
     twin = ["--world", world, "--profile", args.profile, *both]
-    unseen = args.unseen if args.unseen is not None else 1 if args.wire else 3
     fusion = [*both, "--name", name, "--connect", endpoint, "--method", "lira", "--teacher", "scripted"]
-    fusion += ["--run", str(folder), "--train-laps", str(args.laps), "--unseen", str(unseen)]
+    fusion += ["--run", str(folder), "--train-laps", str(args.laps), "--unseen", str(args.unseen)]
     fusion += ["--as-command", shlex.join(["lira", *sys.argv[1:]])]
     if args.wire:
         arena = f"127.0.0.1:{free_port()}"
