@@ -1,10 +1,10 @@
 """The control loop: read, decide, drive, learn, report, keep time. The same page drives every robot."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Protocol
 
-from fusion.method import STAND, Choice, Lesson, Method, Policy, Proposal
+from fusion.method import STAND, Choice, Chooser, Lesson, Method, Policy, Proposal
 from fusion.preprocess import Features, Preprocessor
 from hal.errors import SensorError
 from hal.messages import STOP, Action, Applied, Command, CourseState, Observation, Reason, Source, Twist
@@ -18,10 +18,13 @@ HELD = frozenset({Reason.STALE, Reason.NEUTRAL_FIRST, Reason.REFUSED, Reason.EST
 class Teacher(Protocol):
     """Whoever can take the wheel: a script here; a person does the same with a gamepad, from outside."""
 
-    def act(self, state: CourseState, proposal: Proposal, policy: Policy | None) -> Action | None:
-        """Return the human's action, or None while the dead-man is not held.
+    def act(
+        self, state: CourseState, proposal: Proposal, policy: Policy | None, offers: Mapping[str, Policy]
+    ) -> Action | str | None:
+        """Return the human's action, or who shall have the wheel instead, or None while the dead-man is not held.
 
-        `policy` is what would drive from here on, None before the novice has learned anything.
+        `policy` is what would drive from here on, None before the novice has learned anything; `offers` are the
+        experts that can be given the wheel.
         """
 
     def reset(self, layout: int) -> None:
@@ -81,7 +84,11 @@ class ControlLoop:
         proposal = method.propose(features)
         state = None if self._truth is None else self._truth()
         if teacher is not None and state is not None:
-            self._teach(teacher.act(state, proposal, self._driving_policy(method, proposal)), observation.seq)
+            offers = method.offers if isinstance(method, Chooser) else {}
+            answer = teacher.act(state, proposal, self._driving_policy(method, proposal), offers)
+            if isinstance(answer, str) and isinstance(method, Chooser):
+                method.choose(answer)  # from the next step on
+            self._teach(None if isinstance(answer, str) else answer, observation.seq)
         applied = self._command(proposal.command, observation.seq)
         lesson = self._learn(method, proposal, applied)
         self._keep_time()

@@ -2,13 +2,14 @@
 
 import time
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 
 from fusion.control import Step
 from fusion.demonstrations import Demonstration
 from fusion.ledger import Ledger
-from fusion.method import Call
+from fusion.method import Call, Proposal
 from fusion.record import Pose, Record, StepRecord
 from hal.messages import Decision
 
@@ -37,6 +38,7 @@ class Journal:
         self._publish = publish
         self._began_s = time.monotonic()
         self._call = Call.NONE
+        self._reserved: dict[int, tuple[Proposal, Demonstration]] = {}  # the proposal too: so its id stays its own
 
     @property
     def elapsed_s(self) -> float:
@@ -46,22 +48,10 @@ class Journal:
     def note(self, step: Step, *, phase: str, lap: int, layout: int, training_steps: int) -> None:
         """Record one step."""
         choice, features = step.lesson.choice, step.proposal.features
-        if choice.label is not None:
-            self._keep(
-                Demonstration(
-                    stamp_s=step.observation.stamp_s,
-                    observation=step.observation.seq,
-                    lap=lap,
-                    source=choice.driver,
-                    action=choice.label,
-                    novice=step.proposal.novice,
-                    stored=step.lesson.stored,
-                    scan=features.scan,
-                    image=features.image,
-                )
-            )
+        self._keep_labels(step, lap)
         if phase == "train":
-            self.ledger.note(step.lesson, now_s=step.observation.stamp_s, trained=training_steps > 0)
+            demonstrating = step.proposal.choice.driver == "human"
+            self.ledger.note(step.lesson, now_s=step.observation.stamp_s, demonstrating=demonstrating)
         decision = self._decision(step, phase, lap, training_steps)
         self._publish(decision)
         risen = choice.call not in (Call.NONE, self._call)
@@ -76,6 +66,29 @@ class Journal:
                 elapsed_s=self.elapsed_s,
             )
         )
+
+    def _keep_labels(self, step: Step, lap: int) -> None:
+        """Hand on the step's label, and those of earlier steps on which it was decided now."""
+        choice, features = step.lesson.choice, step.proposal.features
+        if choice.label is not None:
+            label = Demonstration(
+                stamp_s=step.observation.stamp_s,
+                observation=step.observation.seq,
+                lap=lap,
+                source=choice.driver,
+                action=choice.label,
+                novice=step.proposal.novice,
+                stored=step.lesson.stored,
+                scan=features.scan,
+                image=features.image,
+            )
+            if step.lesson.reserved:
+                self._reserved[id(step.proposal)] = step.proposal, label
+            else:
+                self._keep(label)
+        for settled in step.lesson.settled:
+            _, label = self._reserved.pop(id(settled.proposal))
+            self._keep(replace(label, stored=settled.stored))
 
     def _decision(self, step: Step, phase: str, lap: int, training_steps: int) -> Decision:
         choice, proposal = step.lesson.choice, step.proposal

@@ -36,6 +36,8 @@ class Account(msgspec.Struct, frozen=True):
 class Ledger:
     """Counts over a session. An intervention is a maximal run of steps with the human in control.
 
+    To give an expert the wheel counts as one intervention and one human label.
+
     What the human drives before the first training step is the initial demonstration: its labels are counted apart,
     and it is neither an intervention nor a call.
     """
@@ -46,6 +48,7 @@ class Ledger:
         self._given: Counter[str] = Counter()
         self._stored: Counter[str] = Counter()
         self._count: Counter[str] = Counter()
+        self._choices = 0
         self.new_episode()
 
     def new_episode(self) -> None:
@@ -53,24 +56,28 @@ class Ledger:
         self._last: Choice | None = None
         self._unanswered: list[float] = []  # ends of the latest call episodes
 
-    def note(self, lesson: Lesson, *, now_s: float, trained: bool) -> None:
-        """Count one step; `trained` says whether the novice had been trained before it."""
+    def note(self, lesson: Lesson, *, now_s: float, demonstrating: bool) -> None:
+        """Count one step; `demonstrating` says whether the method had nobody to drive but the human."""
         choice = lesson.choice
         if choice.label is not None:
-            source = DEMONSTRATION if choice.driver == "human" and not trained else choice.driver
+            source = DEMONSTRATION if demonstrating and choice.driver == "human" else choice.driver
             self._given[source] += 1
             self._stored[source] += lesson.stored
-        if trained:
+        for settled in lesson.settled:
+            self._stored[settled.proposal.choice.driver] += settled.stored
+        if not demonstrating:
             self._note_driver(choice, now_s)
             self._note_call(choice, now_s)
         self._last = choice
 
     def _note_driver(self, choice: Choice, now_s: float) -> None:
         human, last = choice.driver == "human", self._last
+        chosen = choice.given > (last.given if last is not None else 0)
+        self._choices += chosen
         self._count["steps"] += 1
         self._count["human_steps"] += human
         self._count["switches"] += last is not None and last.driver != choice.driver
-        if human and (last is None or last.driver != "human"):
+        if chosen or (human and (last is None or last.driver != "human")):
             self.interventions += 1
             recent = sum(end_s >= now_s - ANSWER_S for end_s in self._unanswered)
             self._count["answered"] += recent
@@ -93,9 +100,9 @@ class Ledger:
     def labels(self) -> LabelCounts:
         """Labels so far."""
         return LabelCounts(
-            given_human=self._given["human"],
+            given_human=self._given["human"] + self._choices,
             given_expert=_experts(self._given),
-            stored_human=self._stored["human"],
+            stored_human=self._stored["human"] + self._choices,
             stored_expert=_experts(self._stored),
             demonstration=self._stored[DEMONSTRATION],
         )

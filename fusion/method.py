@@ -1,9 +1,9 @@
 """What a way of teaching looks like to the control loop: it proposes before the robot moves and learns after."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from enum import StrEnum
-from typing import Protocol
+from typing import Protocol, runtime_checkable
 
 from fusion.preprocess import Features
 from hal.messages import Action, ExpertView
@@ -33,12 +33,16 @@ class Expert:
 
 @dataclass(frozen=True, slots=True)
 class Choice:
-    """One row of the table of Algorithm 1: who drives, with which action, what is learned, how the human is called."""
+    """One row of the table of Algorithm 1: who drives, with which action, what is learned, how the human is called.
+
+    `given` counts the times the human gave an expert the wheel; 0 where the driver has it by the method's own rules.
+    """
 
     driver: str
     action: Action
     label: Action | None = None
     call: Call = Call.NONE
+    given: int = 0
 
 
 @dataclass(frozen=True, slots=True)
@@ -60,11 +64,24 @@ class Proposal:
 
 
 @dataclass(frozen=True, slots=True)
+class Settled:
+    """What became of a label that was reserved."""
+
+    proposal: Proposal
+    stored: bool
+
+
+@dataclass(frozen=True, slots=True)
 class Lesson:
-    """What became of a proposal: the choice once the human is known, and whether a label was stored."""
+    """What became of a proposal: the choice once the human is known, and whether a label was stored.
+
+    A label that is `reserved` is decided on later: it comes back among the `settled`.
+    """
 
     choice: Choice
     stored: bool = False
+    reserved: bool = False
+    settled: tuple[Settled, ...] = ()
 
 
 class Method(Protocol):
@@ -84,6 +101,18 @@ class Method(Protocol):
 
     def policy(self, driver: str) -> Policy:
         """Return the policy behind a driver's name, to look ahead with. Raises `KeyError` for "human"."""
+
+
+@runtime_checkable
+class Chooser(Protocol):
+    """A method that a person may tell which expert shall drive: the answer to a call."""
+
+    @property
+    def offers(self) -> Mapping[str, Policy]:
+        """Who can be given the wheel."""
+
+    def choose(self, name: str) -> str | None:
+        """Give the expert of that name the wheel. Returns why not, None if it drives from now on."""
 
 
 @dataclass(frozen=True, slots=True)

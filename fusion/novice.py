@@ -22,6 +22,7 @@ class LearningSettings(Table, frozen=True):
     redundancy: float = 0.05  # L
     action_range: float = 2.0
     filter_human: bool = True  # False keeps every human label
+    human_weight: float = 1.0  # of a human label's squared error
     idle_frames: Literal["label", "skip"] = "label"
 
 
@@ -76,7 +77,8 @@ class Novice:
         keep_always = source == "human" and not self.settings.filter_human
         if not keep_always and is_redundant(action, a_n, threshold):
             return False
-        self.remember(Label(features.scan, features.image, action, source))
+        weight = self.settings.human_weight if source == "human" else 1.0
+        self.remember(Label(features.scan, features.image, action, source, weight))
         return True
 
     def leaves_out(self, human: Action) -> bool:

@@ -16,6 +16,7 @@ STAGES_S = (0.4, 0.6, 0.8, 0.8)
 STEERING: dict[Style, tuple[float, ...]] = {"bang-bang": (-1.0, 0.0, 1.0), "proportional": (-1.0, -0.5, 0.0, 0.5, 1.0)}
 COMFORT_M = 0.40  # clearance below which closeness costs
 STAY_COST = 0.05  # of turning otherwise than the last plan: a small one lets full steer settle on the line
+SPOT_STAY_COST = 1.0  # after a turn on the spot: who turns to and fro there never gets away
 TOUCH_M = 0.03
 
 
@@ -34,18 +35,19 @@ class Planner:
 
     def reset(self) -> None:
         """Forget the last plan."""
-        self._last: float | None = None
+        self._last: Action | None = None
 
     def plan(self, state: CourseState) -> Action:
         """Return the first action of the best sequence from `state`."""
         cost = self._cost(state)
         if self._last is not None:  # stay with a plan unless another is clearly better: labels with one mind
-            cost = cost + STAY_COST * np.abs(self._sequences[:, 0, 1] - self._last)
+            stay_cost = STAY_COST if self._last[0] > 0.0 else SPOT_STAY_COST
+            cost = cost + stay_cost * np.abs(self._sequences[:, 0, 1] - self._last[1])
         linear, angular = self._sequences[int(np.argmin(cost)), 0]
         if self._style == "proportional":
             angular = self._blend(cost)
-        self._last = float(angular)
-        return float(linear), float(angular)
+        self._last = float(linear), float(angular)
+        return self._last
 
     def _cost(self, state: CourseState) -> NDArray[np.float64]:
         futures = self._foresight.imagine(state, self._sequences, self._period_s)

@@ -6,11 +6,10 @@ the governor: the emergency stop and the person's hand work whatever is asked he
 
 from collections.abc import Callable
 from concurrent.futures import Future, ThreadPoolExecutor
-from typing import Protocol, runtime_checkable
 
 from fusion.control import ControlLoop
 from fusion.journal import Journal
-from fusion.method import Method
+from fusion.method import Chooser, Method
 from hal.bus import Bus
 from hal.errors import LiraError
 from hal.messages import OperatorAnswer, OperatorRequest, Request
@@ -20,14 +19,6 @@ DEPTH = 16
 
 Job = Callable[[], str]
 """Work beside the loop that ends with what to say about it. Raises `LiraError`."""
-
-
-@runtime_checkable
-class Chooser(Protocol):
-    """A method that a person may tell which expert shall drive: the answer to a call."""
-
-    def choose(self, name: str) -> str | None:
-        """Give the expert of that name the wheel. Returns why not, None if it drives now."""
 
 
 class RequestLine:

@@ -5,7 +5,8 @@ or a standstill, and hands back once that policy has looked safe for a few steps
 """
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
+from types import MappingProxyType
 from typing import Annotated, Literal
 
 import numpy as np
@@ -44,6 +45,8 @@ class TeacherSettings(Table, frozen=True):
     missed: Share = 0.02
 
 
+NOBODY: Mapping[str, Policy] = MappingProxyType({})
+
 SKILLED = TeacherSettings()
 PERFECT = TeacherSettings(delay_s=0.0, called_delay_s=0.0, gain_sigma=0.0, wrong_direction=0.0, missed=0.0)
 TEACHERS = {"scripted": SKILLED, "perfect": PERFECT}
@@ -75,25 +78,46 @@ class ScriptedTeacher:
         self._gain, self._wrong_steps = 1.0, 0
         self._planner.reset()
 
-    def act(self, state: CourseState, proposal: Proposal, policy: Policy | None) -> Action | None:
-        """Return the action while it holds the wheel, else None."""
+    def act(
+        self, state: CourseState, proposal: Proposal, policy: Policy | None, offers: Mapping[str, Policy] = NOBODY
+    ) -> Action | str | None:
+        """Return the action while it holds the wheel, once the name of an expert that shall have it, else None."""
         if policy is None:
             return self._planner.plan(state)  # the initial demonstration: careful and without faults
         danger = self._danger(state, proposal, policy)
         if self._driving:
             self._safe = 0 if danger else self._safe + 1
             self._driving = self._safe < self._settings.safe_steps
-        elif self._reacts(state.stamp_s, danger, called=proposal.choice.call is not Call.NONE):
+        elif self._reacts(
+            state.stamp_s, danger, alert=proposal.choice.call is not Call.NONE or proposal.choice.given > 0
+        ):
+            name = self._pick(state, offers)
+            if name is not None:
+                self._react_at_s = None
+                return name
             self._take_over()
         if not self._driving:
             return None
         return self._with_faults(self._planner.plan(state))
 
+    def _pick(self, state: CourseState, offers: Mapping[str, Policy]) -> str | None:
+        """An expert that does well from here on, if one can be given the wheel; at times a wrong one."""
+        if not offers:
+            return None
+        if self._random.random() < self._settings.wrong_direction:
+            return list(offers)[int(self._random.integers(len(offers)))]
+        safe = (name for name, policy in offers.items() if not self._goes_wrong(state, policy))
+        return next(safe, None)
+
     def _danger(self, state: CourseState, proposal: Proposal, policy: Policy) -> bool:
-        """Whether the policy would hit something, lose the line or stand within the horizon, at its full speed."""
+        """Whether the policy goes wrong; not looked at where no policy could."""
         slow = proposal.choice.action[0] < self._settings.stall
         if self._settings.follow_line and not slow and not self._within_reach(state):
             return False
+        return self._goes_wrong(state, policy)
+
+    def _goes_wrong(self, state: CourseState, policy: Policy) -> bool:
+        """Whether the policy would hit something, lose the line or stand within the horizon, at its full speed."""
         drive = self._foresight.rollout(state, self._seeing(policy), self._steps, self._period_s)
         unsafe = any(
             each.collided
@@ -139,13 +163,13 @@ class ScriptedTeacher:
 
         return act
 
-    def _reacts(self, now_s: float, danger: bool, *, called: bool) -> bool:
+    def _reacts(self, now_s: float, danger: bool, *, alert: bool) -> bool:
         """Whether the hand moves now: a danger has lasted for as long as it takes to react to it."""
         if not danger:
             self._react_at_s = None
             return False
         if self._react_at_s is None:
-            median = self._settings.called_delay_s if called else self._settings.delay_s
+            median = self._settings.called_delay_s if alert else self._settings.delay_s
             missed = self._random.random() < self._settings.missed
             delay = median * math.exp(self._settings.delay_sigma * self._random.standard_normal())
             self._react_at_s = math.inf if missed else now_s + delay
