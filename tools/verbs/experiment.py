@@ -25,12 +25,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add("name", choices=REGISTRY, metavar="NAME", help=names)
     add("--seeds", type=int, default=3, help="repetitions, seeds 0, 1, 2, ... (default: %(default)s)")
     add("--workers", type=int, default=1, help="processes side by side (default: %(default)s)")
+    add("--scheduler", metavar="ADDRESS", help="run on this Dask cluster instead, like tcp://192.168.1.5:8786")
     add("--run", type=Path, metavar="DIR", help="folder that keeps the trials (default: runs/experiments)")
     add("--json", metavar="FILE", help="write a JSON object to FILE (-: standard output)")
 
 
 def run(args: argparse.Namespace) -> int:
     """Run the trials that are missing and print the tables."""
+    from tools.experiments.pools import Cluster, Here
     from tools.experiments.registry import load
     from tools.experiments.runner import run_trials
     from tools.verbs.bench import table, take_stdout, write_file
@@ -39,7 +41,8 @@ def run(args: argparse.Namespace) -> int:
         raise ConfigError("--seeds and --workers are at least 1", "Give a positive number.")
     experiment = load(args.name)
     output = take_stdout() if args.json == "-" else None
-    outcomes = run_trials(experiment.trials(args.seeds), args.run or Path("runs") / "experiments", args.workers)
+    pool = Here(args.workers) if args.scheduler is None else Cluster(args.scheduler)
+    outcomes = run_trials(experiment.trials(args.seeds), args.run or Path("runs") / "experiments", pool)
     tables = experiment.tables(outcomes)
     if args.json is not None:
         report = {"name": args.name, "results": tables[0].rows, "ratios": experiment.ratios(outcomes)}
