@@ -3,6 +3,7 @@
 import contextlib
 import math
 import re
+import signal
 import threading
 import time
 from contextlib import contextmanager
@@ -18,7 +19,8 @@ from robot.settings import load_settings, set_key, write_base_setting
 from sim_backend.emulators.core2 import Core2Unit, Firmware
 from sim_backend.emulators.rplidar import RplidarUnit
 from sim_backend.emulators.wire import Wire
-from tools.cli import main
+from tools.cli import EXIT_INTERRUPTED, main
+from tools.processes import ChildProcess, lira_command
 from tools.verbs import calibrate
 
 WALLS_M = (3.0, 1.7, -1.0, -1.3)  # ahead, left, behind, right of where it starts
@@ -83,13 +85,14 @@ def moved(pose, ahead_m, turn_rad):
 
 @contextmanager
 def devices(folder, room):
-    board = Core2Unit(room.drive, room.measure, Firmware(boot_s=0.05))
-    wires = [Wire(folder / "core2", board), Wire(folder / "rplidar", RplidarUnit(room.distances))]
+    lidar = RplidarUnit(room.distances)
+    wires = [Wire(folder / "core2", Core2Unit(room.drive, room.measure, Firmware(boot_s=0.05)))]
+    wires.append(Wire(folder / "rplidar", lidar))
     settings = folder / "mine.toml"
     settings.write_text(QUICK)
     try:
         words = ["calibrate", "base", "--base", str(folder / "core2"), "--settings", str(settings)]
-        yield words, ["--lidar", str(folder / "rplidar"), "--yes"], wires
+        yield words, ["--lidar", str(folder / "rplidar"), "--yes"], wires[1], lidar
     finally:
         for wire in wires:
             wire.close()
@@ -97,7 +100,7 @@ def devices(folder, room):
 
 def test_with_a_lidar_a_ten_percent_error_is_found_by_itself_and_written(tmp_path, capsys):
     room = Room(far=1.1, much=1.15)
-    with devices(tmp_path, room) as (words, lidar, _):
+    with devices(tmp_path, room) as (words, lidar, *_):
         words = [*words, *lidar, "--distance", "0.5"]  # noqa: PLW2901
         assert main([*words, "--turns", "0.75"]) == 0, capsys.readouterr().err
         out = capsys.readouterr().out
@@ -119,7 +122,7 @@ def test_with_a_tape_the_person_says_what_was_measured(tmp_path, capsys, monkeyp
     asked = []
     monkeypatch.setattr("sys.stdin.isatty", lambda: True, raising=False)
     monkeypatch.setattr("builtins.input", lambda question: asked.append(question) or next(answers))
-    with devices(tmp_path, Room(far=1.1)) as (words, _, _):
+    with devices(tmp_path, Room(far=1.1)) as (words, *_):
         words = [*words, *NO_FIELD, "--only", "distance", "--distance", "0.3"]  # noqa: PLW2901
         assert main(words) == 0, capsys.readouterr().err
     assert "power switch" in asked[0]
@@ -134,7 +137,7 @@ def refused(words, capsys):
 
 def test_it_refuses_what_is_not_safe_and_writes_nothing(tmp_path, capsys, monkeypatch):
     room = Room()
-    with devices(tmp_path, room) as (words, lidar, _):
+    with devices(tmp_path, room) as (words, lidar, *_):
         assert "nobody is there to ask" in refused([*words, *lidar[:2]], capsys)
         assert "no --lidar" in refused([*words, "--by", "lidar"], capsys)
         assert "--distance is" in refused([*words, "--distance", "90", "--yes"], capsys)
@@ -154,19 +157,19 @@ def test_whoever_says_no_moves_nothing(tmp_path, capsys, monkeypatch):
     monkeypatch.setattr("sys.stdin.isatty", lambda: True, raising=False)
     monkeypatch.setattr("builtins.input", lambda _: "")
     room = Room()
-    with devices(tmp_path, room) as (words, _, _):
+    with devices(tmp_path, room) as (words, *_):
         assert "Nothing was moved" in refused([*words, *NO_FIELD], capsys)
     assert set(room.twists) <= {STOP}
 
 
 def test_a_lidar_that_goes_mid_drive_ends_it(tmp_path, capsys):
     room = Room()
-    with devices(tmp_path, room) as (words, lidar, wires):
+    with devices(tmp_path, room) as (words, lidar, wire, _):
 
         def unplug_on_the_way():
             while room.true[0] < 0.05:
                 time.sleep(0.01)
-            wires[1].unplug()
+            wire.unplug()
 
         vandal = threading.Thread(target=unplug_on_the_way, daemon=True)
         vandal.start()
@@ -175,6 +178,25 @@ def test_a_lidar_that_goes_mid_drive_ends_it(tmp_path, capsys):
     assert "the robot stopped" in error
     assert 0.05 < room.true[0] < 0.3
     assert room.twists[-1] == STOP
+    assert (tmp_path / "mine.toml").read_text() == QUICK
+
+
+@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGHUP])
+def test_a_kill_and_a_lost_terminal_end_it_with_wheels_and_lidar_still(tmp_path, number):
+    room = Room()
+    with devices(tmp_path, room) as (words, lidar, _, unit):
+        command = lira_command(*words, *lidar, "--only", "distance")
+        with ChildProcess("the calibration", command, tmp_path / "calibrate.log") as child:
+            until_s = time.monotonic() + 20.0
+            while room.true[0] < 0.05:
+                assert time.monotonic() < until_s, child.output()
+                time.sleep(0.01)
+            child.signal(number)
+            assert child.wait(10.0) == EXIT_INTERRUPTED
+        assert room.twists[-1] == STOP
+        assert room.true[0] < 0.3
+        time.sleep(0.05)
+        assert unit.pwm == 0
     assert (tmp_path / "mine.toml").read_text() == QUICK
 
 

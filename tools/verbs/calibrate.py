@@ -12,7 +12,10 @@ examples:
 
 import argparse
 import math
+import signal
 import sys
+from collections.abc import Iterator
+from contextlib import closing, contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -62,7 +65,7 @@ def run(args: argparse.Namespace) -> int:
     wanted = [name for name in KEYS if args.only in (None, name)]
     ask_for_consent(args, wanted)
     robot = GovernedRobot(Rosbot(profile, Devices(args.base, args.lidar, settings=settings)))
-    try:
+    with ended_like_ctrl_c(), closing(robot):
         robot.open()
         manoeuvre = Manoeuvre(robot, Pace())
         for name in wanted:
@@ -74,9 +77,19 @@ def run(args: argparse.Namespace) -> int:
             print(f"{name}: reported {reported:.3f} {unit}, measured {true:.3f} {unit}", flush=True)
             write_base_setting(args.settings, KEYS[name], scale)
             print(f"  {KEYS[name]} {before:.4f} -> {scale:.4f}, written to {args.settings}", flush=True)
-    finally:
-        robot.close()
     return 0
+
+
+@contextmanager
+def ended_like_ctrl_c() -> Iterator[None]:
+    """Let a kill, and a terminal that goes away, end this as Ctrl-C does: wheels at zero, lidar still."""
+    numbers = (signal.SIGTERM, signal.SIGHUP)
+    before = [signal.signal(number, signal.default_int_handler) for number in numbers]
+    try:
+        yield
+    finally:
+        for number, handler in zip(numbers, before, strict=True):
+            signal.signal(number, handler)
 
 
 def ask_for_consent(args: argparse.Namespace, wanted: list[str]) -> None:
