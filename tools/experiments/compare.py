@@ -3,12 +3,11 @@
 from collections.abc import Sequence
 from functools import partial
 
-import numpy as np
-
 from tools.experiments.experiment import Experiment, Finding, Outcomes, Row, Table
+from tools.experiments.measures import by_method, driving_row, effort_row, expert_labels, label_row
 from tools.experiments.methods import HG_DAGGER, LIRA
-from tools.experiments.statistics import iqm, median_interval, paired_ratios
-from tools.experiments.trial import Outcome, Trial
+from tools.experiments.statistics import median_interval, paired_ratios
+from tools.experiments.trial import Trial
 
 QUANTITIES = ("human_labels", "interventions")
 # Table II as printed, in the columns of our summary.
@@ -42,48 +41,12 @@ def trials(seeds: int, world: str) -> list[Trial]:
     return [Trial(method, world, seed) for method in (*LIRA, *HG_DAGGER) for seed in range(seeds)]
 
 
-def by_method(outcomes: Sequence[Outcome]) -> dict[str, list[Outcome]]:
-    """Outcomes of each method, in the order of the seeds."""
-    groups: dict[str, list[Outcome]] = {}
-    for outcome in sorted(outcomes, key=lambda each: each.trial.seed):
-        groups.setdefault(outcome.trial.method.name, []).append(outcome)
-    return groups
+def summary(outcomes: Outcomes) -> list[Row]:
+    """One row per method in the columns of Table II."""
+    return [{"method": method} | label_row(group) for method, group in by_method(outcomes).items()]
 
 
-def summary(outcomes: Sequence[Outcome]) -> list[Row]:
-    """One row per method: medians and interquartile means over the seeds, after the first lap and at the end."""
-    rows: list[Row] = []
-    for method, group in by_method(outcomes).items():
-        first = [outcome.after(1) for outcome in group]
-        final = [outcome.result for outcome in group]
-        unseen = [lap for outcome in group for lap in outcome.laps if lap.phase == "unseen"]
-        rows.append(
-            {
-                "method": method,
-                "n": len(group),
-                "censored": sum(not result.converged for result in final),
-                "laps": _median([result.laps for result in final]),
-                "buffer_first": _median([lap.buffer for lap in first]),
-                "human_labels_first": _median([lap.human_labels for lap in first]),
-                "interventions_first": _median([lap.interventions for lap in first]),
-                "buffer": _median([result.buffer for result in final]),
-                "human_labels": _median([result.human_labels for result in final]),
-                "human_labels_iqm": iqm([result.human_labels for result in final]),
-                "interventions": _median([result.interventions for result in final]),
-                "interventions_iqm": iqm([result.interventions for result in final]),
-                "demonstration": _median([result.demonstration for result in final]),
-                "calls": _median([result.calls for result in final]),
-                "unassisted_laps": sum(any(lap.unassisted for lap in o.laps if lap.phase == "train") for o in group),
-                "unseen_passed": sum(lap.passed for lap in unseen),
-                "unseen_laps": len(unseen),
-                "unseen_collisions": sum(lap.collisions for lap in unseen),
-                "lateral_rms_m": _median([lap.lateral_rms_m or 0.0 for lap in unseen]) if unseen else None,
-            }
-        )
-    return rows
-
-
-def ratios(outcomes: Sequence[Outcome]) -> list[Row]:
+def ratios(outcomes: Outcomes) -> list[Row]:
     """HG-DAgger over LIRA-SPF, pair by pair of one seed, with 95 % bootstrap intervals of the median.
 
     `censored` counts pairs in which either run met its cap. Where that is HG-DAgger's, its true ratio is larger.
@@ -115,16 +78,40 @@ def ratios(outcomes: Sequence[Outcome]) -> list[Row]:
     return rows
 
 
-def _median(values: Sequence[float]) -> float:
-    return float(np.median(np.asarray(values, dtype=np.float64)))
+def amortised(outcomes: Outcomes) -> list[Row]:
+    """After how many tasks the labels that trained the experts are paid back by what LIRA-SPF saves on each.
+
+    A task costs the labels of the demonstration and of the interventions, medians over the seeds.
+    """
+    groups = by_method(outcomes)
+    cost = {name: effort_row(group)["human_total"] for name, group in groups.items()}
+    experts = sum(expert_labels().values())
+    rows: list[Row] = []
+    for method in (each.name for each in LIRA if each.name in groups):
+        for against in (each.name for each in HG_DAGGER if each.name in groups):
+            saved = float(str(cost[against])) - float(str(cost[method]))
+            rows.append(
+                {
+                    "method": method,
+                    "against": against,
+                    "experts_labels": experts,
+                    "saved_per_task": saved,
+                    "tasks_until_paid": experts / saved if saved > 0 else None,
+                }
+            )
+    return rows
 
 
 def tables(outcomes: Outcomes, thesis: Sequence[Row]) -> list[Table]:
-    """The methods beside the thesis's, and the paired ratios."""
+    """The methods beside the thesis's, the paired ratios, and what else it took."""
     words = ", ".join(f"{value:.2f} {quantity}" for quantity, value in THESIS_RATIOS.items())
+    groups = by_method(outcomes)
     return [
         Table("Labels and interventions until the novice passed its proving run", [*summary(outcomes), *thesis]),
         Table("HG-DAgger over LIRA-SPF, by pairs of one seed", ratios(outcomes), f"Thesis, Table II: {words}."),
+        Table("Calls and the human's time", [{"method": name} | effort_row(group) for name, group in groups.items()]),
+        Table("Driving", [{"method": name} | driving_row(group) for name, group in groups.items()]),
+        Table("Labels that trained the experts, paid back", amortised(outcomes), "Labels are medians over the seeds."),
     ]
 
 
