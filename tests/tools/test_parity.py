@@ -2,6 +2,7 @@
 
 import json
 import math
+import signal
 import threading
 import uuid
 from contextlib import contextmanager
@@ -29,6 +30,13 @@ from tools.processes import free_port
 
 PROFILE = load_profile("rosbot2")
 WALLS = (3.0, -1.5, 2.0, -1.2)  # of a room, seen from the robot: ahead, behind, left, right
+
+
+@pytest.fixture(autouse=True)
+def _keep_signals():
+    before = signal.getsignal(signal.SIGTERM)
+    yield
+    signal.signal(signal.SIGTERM, before)
 
 
 def room(bearing):
@@ -251,7 +259,7 @@ def test_somebody_else_at_the_wheel_is_an_error():
     ("words", "complaint"),
     [
         (["rosbot"], "'rosbot' names no robot"),
-        (["a@127.0.0.1:7447"], "1 robot to compare"),
+        (["a@127.0.0.1:7447"], "1 robots to compare"),
         (["--world", "nosuch"], "unknown world 'nosuch'"),
         (["--profile", "nosuch"], "unknown profile 'nosuch'"),
     ],

@@ -14,6 +14,7 @@ exit status: 0 if nothing differs by more than is allowed, 1 if something does, 
 """
 
 import argparse
+import signal
 import sys
 from contextlib import ExitStack
 from pathlib import Path
@@ -50,7 +51,8 @@ def run(args: argparse.Namespace) -> int:
 
     ends = [address(word) for word in args.robots]
     if len(ends) not in (0, 2):
-        raise ConfigError(f"{len(ends)} robot to compare", "Name two, or none for the twin's own comparison.")
+        raise ConfigError(f"{len(ends)} robots to compare", "Name two, or none for the twin's own comparison.")
+    signal.signal(signal.SIGTERM, signal.default_int_handler)  # whoever ends this stops the robot and own processes
     first, second = [over_bus(*end) for end in ends] if ends else own(args)
     rows = compare(first, second)
     show(args, first, second, rows)
