@@ -259,7 +259,7 @@ def test_somebody_else_at_the_wheel_is_an_error():
     ("words", "complaint"),
     [
         (["rosbot"], "'rosbot' names no robot"),
-        (["a@127.0.0.1:7447"], "1 robots to compare"),
+        (["a@127.0.0.1:7447"], "parity compares two robots, not 1"),
         (["--world", "nosuch"], "unknown world 'nosuch'"),
         (["--profile", "nosuch"], "unknown profile 'nosuch'"),
     ],
