@@ -51,7 +51,9 @@ def run(args: argparse.Namespace) -> int:
 
     ends = [address(word) for word in args.robots]
     if len(ends) not in (0, 2):
-        raise ConfigError(f"parity compares two robots, not {len(ends)}", "Name two, or none for the twin and its own wire.")
+        raise ConfigError(
+            f"parity compares two robots, not {len(ends)}", "Name two, or none for the twin and its wire."
+        )
     signal.signal(signal.SIGTERM, signal.default_int_handler)  # whoever ends this stops the robot and own processes
     first, second = [over_bus(*end) for end in ends] if ends else own(args)
     rows = compare(first, second)
