@@ -15,10 +15,11 @@ from hal.errors import ConfigError
 from hal.messages import STOP, LaserScan, Odometry
 from robot.calibration import turn_between, wall_ahead_m
 from robot.line import Line
-from robot.settings import load_settings, set_key, write_base_setting
+from robot.settings import BaseSettings, load_settings, set_key, write_base_setting
 from sim_backend.emulators.core2 import Core2Unit, Firmware
 from sim_backend.emulators.rplidar import RplidarUnit
 from sim_backend.emulators.wire import Wire
+from tools.calibration import CalibrationError, Way
 from tools.cli import EXIT_INTERRUPTED, main
 from tools.processes import ChildProcess, lira_command
 from tools.verbs import calibrate
@@ -38,10 +39,13 @@ def to_walls(x_m, y_m, bearing):
 
 
 class Room:
-    """A robot in a room: it really goes `far` times as far, and turns `much` times as much, as its board reports."""
+    """A robot in a room: it really goes `far` times as far, and turns `much` times as much, as its board reports.
 
-    def __init__(self, far=1.0, much=1.0):
-        self._far, self._much = far, much
+    The board also reports `slip` metres ahead for each radian of a turn.
+    """
+
+    def __init__(self, far=1.0, much=1.0, slip=0.0):
+        self._far, self._much, self._slip = far, much, slip
         self._lock = threading.Lock()
         self._twist, self._since_s = STOP, time.monotonic()
         self.true = self._told = (0.0, 0.0, 0.0)
@@ -74,7 +78,8 @@ class Room:
             return
         ahead_m, turn_rad = self._twist.linear_m_s * dt_s, self._twist.angular_rad_s * dt_s
         self.true = moved(self.true, ahead_m, turn_rad)
-        self._told = moved(self._told, ahead_m / self._far, turn_rad / self._much)
+        told_rad = turn_rad / self._much
+        self._told = moved(self._told, ahead_m / self._far + self._slip * told_rad, told_rad)
 
 
 def moved(pose, ahead_m, turn_rad):
@@ -99,7 +104,7 @@ def devices(folder, room):
 
 
 def test_with_a_lidar_a_ten_percent_error_is_found_by_itself_and_written(tmp_path, capsys):
-    room = Room(far=1.1, much=1.15)
+    room = Room(far=1.1, much=1.15, slip=-0.0114)
     with devices(tmp_path, room) as (words, lidar, *_):
         words = [*words, *lidar, "--distance", "0.5"]  # noqa: PLW2901
         assert main([*words, "--turns", "0.75"]) == 0, capsys.readouterr().err
@@ -107,6 +112,7 @@ def test_with_a_lidar_a_ten_percent_error_is_found_by_itself_and_written(tmp_pat
         settings = load_settings(tmp_path / "mine.toml")
         assert settings.base.distance_scale == pytest.approx(1.1, abs=0.02), out
         assert settings.base.turn_scale == pytest.approx(1.15, abs=0.015), out
+        assert settings.base.spin_slip_m_rad == pytest.approx(-0.0114, abs=0.001), out
         assert "distance_scale 1.0000 -> 1." in out
         assert "# it turns" in (tmp_path / "mine.toml").read_text()
         assert room.twists[-1] == STOP
@@ -200,12 +206,21 @@ def test_a_kill_and_a_lost_terminal_end_it_with_wheels_and_lidar_still(tmp_path,
     assert (tmp_path / "mine.toml").read_text() == QUICK
 
 
-def test_what_cannot_be_true_is_not_written():
-    from tools.calibration import CalibrationError
+def way_of(*, turns, ahead_m, turn_rad):
+    way = Way(turns=turns)
+    way.ahead_m, way.turn_rad = ahead_m, turn_rad
+    return way
 
-    with pytest.raises(CalibrationError, match="cannot be right"):
-        calibrate.checked("distance", 1.9)
-    assert calibrate.checked("distance", 1.1) == 1.1
+
+def test_what_is_found_builds_on_what_was_set_and_what_cannot_be_true_is_not_written():
+    before = BaseSettings(distance_scale=1.2, turn_scale=1.1, spin_slip_m_rad=-0.01)
+    found = calibrate.found("distance", before, 1.1, way_of(turns=False, ahead_m=1.0, turn_rad=0.0))
+    assert found == {"distance_scale": pytest.approx(1.32)}
+    found = calibrate.found("turn", before, 11.0, way_of(turns=True, ahead_m=0.012, turn_rad=11.0))
+    assert found == {"turn_scale": pytest.approx(1.1), "spin_slip_m_rad": pytest.approx(-0.01 + 0.01 / 10.0)}
+    for name, true, ahead_m in (("distance", 1.9, 1.0), ("turn", 1.0, 0.2)):
+        with pytest.raises(CalibrationError, match="cannot be right"):
+            calibrate.found(name, BaseSettings(), true, way_of(turns=name == "turn", ahead_m=ahead_m, turn_rad=1.0))
 
 
 def scan_at(x_m, y_m, yaw_rad, beams=400, noise_m=0.005):
