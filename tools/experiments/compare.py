@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from functools import partial
 
-from tools.experiments.experiment import Experiment, Finding, Outcomes, Row, Table
+from tools.experiments.experiment import Experiment, Finding, Outcomes, Picture, Row, Table
 from tools.experiments.measures import by_method, driving_row, effort_row, expert_labels, label_row
 from tools.experiments.methods import HG_DAGGER, LIRA
 from tools.experiments.statistics import median_interval, paired_ratios
@@ -132,11 +132,35 @@ def findings(outcomes: Outcomes, name: str) -> list[Finding]:
     return found
 
 
+def figures(outcomes: Outcomes) -> list[Picture]:
+    """Figures 11 and 12, and the ratios."""
+    from tools.experiments import plots
+
+    groups = by_method(outcomes)
+    cut = {name: [not each.result.converged for each in group] for name, group in groups.items()}
+    pictures = [
+        Picture(
+            quantity,
+            f"{quantity.replace('_', ' ').capitalize()} until the novice passed; a cross is a run that never did",
+            partial(
+                plots.boxes,
+                {name: [getattr(each.result, quantity) for each in group] for name, group in groups.items()},
+                cut,
+                quantity.replace("_", " "),
+            ),
+        )
+        for quantity in QUANTITIES
+    ]
+    words = "HG-DAgger over LIRA-SPF, pair by pair: medians and 95 % intervals"
+    return [*pictures, Picture("ratios", words, partial(plots.intervals, ratios(outcomes), THESIS_RATIOS))]
+
+
 EXPERIMENTS = {
     name: Experiment(
         trials=partial(trials, world=world),
         tables=partial(tables, thesis=thesis),
         findings=partial(findings, name=name),
+        figures=figures,
         ratios=ratios,
     )
     for name, world, thesis in (("table2", "line-obstacles", THESIS), ("race", "race", []))

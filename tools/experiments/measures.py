@@ -48,13 +48,15 @@ def label_row(group: Sequence[Outcome]) -> Row:
 def effort_row(group: Sequence[Outcome]) -> Row:
     """What it took of the human beside labels: time, calls and how good they were; medians over the seeds.
 
-    Precision and recall are over all calls and interventions of the group together; the terms are those of
-    `fusion.ledger.Account`. `with_experts` adds the labels that trained the experts, which every novice here begins
-    with.
+    Precision and recall are over all calls and interventions of the group together, and None for a method that never
+    calls; the terms are those of `fusion.ledger.Account`. `with_experts` adds the labels that trained the experts,
+    which every novice here begins with.
     """
     accounts = [outcome.result.account for outcome in group]
     period_s = load_profile(PROFILE).period_s
     shown = [outcome.result.demonstration for outcome in group]
+    episodes = sum(each.call_episodes for each in accounts)
+    wanted = sum(outcome.result.interventions for outcome in group) if episodes else 0
     totals = [outcome.result.human_labels + labels for outcome, labels in zip(group, shown, strict=True)]
     return {
         "demonstration": median(shown),
@@ -63,10 +65,8 @@ def effort_row(group: Sequence[Outcome]) -> Row:
         "expert_stored": median([experts_share(each.stored) for each in accounts]),
         "calls": median([outcome.result.calls for outcome in group]),
         "call_episodes": median([each.call_episodes for each in accounts]),
-        "precision": ratio(sum(each.answered for each in accounts), sum(each.call_episodes for each in accounts)),
-        "recall": ratio(
-            sum(each.called_for for each in accounts), sum(outcome.result.interventions for outcome in group)
-        ),
+        "precision": ratio(sum(each.answered for each in accounts), episodes),
+        "recall": ratio(sum(each.called_for for each in accounts), wanted),
         "slowed_steps": median([each.slowed_steps for each in accounts]),
         "switches": median([each.switches for each in accounts]),
         "human_total": median(totals),
