@@ -2,6 +2,7 @@
 
 import math
 import time
+import warnings
 from collections.abc import Callable
 from dataclasses import dataclass
 
@@ -87,7 +88,10 @@ class Manoeuvre:
         if len(scans) < 3:
             raise CalibrationError("the lidar shows nothing", "Look at its cable, or calibrate --by tape.")
         newest = scans[-1]
-        ranges = np.median(np.stack([scan.ranges for scan in scans if len(scan.ranges) == len(newest.ranges)]), axis=0)
+        beams = np.stack([scan.ranges for scan in scans if len(scan.ranges) == len(newest.ranges)])
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", RuntimeWarning)  # a beam that never sees anything stays nan
+            ranges = np.nanmedian(beams, axis=0)
         return LaserScan(
             newest.stamp_s,
             newest.angle_min,
