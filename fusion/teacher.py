@@ -24,7 +24,7 @@ Share = Annotated[float, Meta(ge=0.0, le=1.0)]
 
 
 class TeacherSettings(Table, frozen=True):
-    """The teacher's skill. The defaults are a skilled human's faults (all assumed); see `PERFECT`."""
+    """The teacher's skill. The defaults are a skilled human's faults (all assumed); see `PERFECT` and `UNSKILLED`."""
 
     style: Literal["bang-bang", "proportional"] = "bang-bang"
     horizon_s: float = 1.5
@@ -46,7 +46,8 @@ class TeacherSettings(Table, frozen=True):
 
 SKILLED = TeacherSettings()
 PERFECT = TeacherSettings(delay_s=0.0, called_delay_s=0.0, gain_sigma=0.0, wrong_direction=0.0, missed=0.0)
-TEACHERS = {"scripted": SKILLED, "perfect": PERFECT}
+UNSKILLED = TeacherSettings(delay_s=1.0, called_delay_s=0.6, gain_sigma=0.4, wrong_direction=0.15, missed=0.1)
+TEACHERS = {"scripted": SKILLED, "perfect": PERFECT, "unskilled": UNSKILLED}
 
 
 class ScriptedTeacher:

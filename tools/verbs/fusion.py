@@ -60,9 +60,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     add(
         "--teacher",
-        choices=("none", "scripted", "perfect"),
+        choices=("none", "scripted", "perfect", "unskilled"),
         default="none",
-        help="who helps: a person with a gamepad (none), or on a twin a script with or without a human's faults",
+        help="who helps: a person with a gamepad (none), or on a twin a script, with few, no or many of a human's faults",
     )
     add(
         "--train-laps",
