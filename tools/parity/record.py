@@ -142,7 +142,7 @@ class _Driver:
             why = "nothing" if applied is None else ", ".join([applied.reason.value, *applied.clamps])
             raise InterruptedScriptError(
                 f"'{self.recording.name}' did not do '{phase.name}' to the end; it says: {why}",
-                "It needs a metre of free floor on all sides, its sensors, no other driver, and a machine that is not busy.",
+                "It needs a metre of free floor on all sides, its sensors, no other driver, and a machine with time.",
             )
 
     def _until(self, done: Any, timeout_s: float, complaint: str) -> None:
