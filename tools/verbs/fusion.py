@@ -62,7 +62,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--teacher",
         choices=("none", "scripted", "perfect", "unskilled"),
         default="none",
-        help="who helps: a person with a gamepad (none), or on a twin a script, with few, no or many of a human's faults",
+        help="who helps: a person with a gamepad (none), or on a twin a script with few, no or many human faults",
     )
     add(
         "--train-laps",
