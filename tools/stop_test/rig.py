@@ -160,15 +160,16 @@ class Rig:
 
     def _wait_until_it_drives(self, role: str) -> None:
         began_s = time.monotonic()
-        while not (self._fast_since(began_s) and self._source() is (Source.TELEOP if role == HAND else Source.POLICY)):
+        while not (self.is_fast(began_s) and self._source() is (Source.TELEOP if role == HAND else Source.POLICY)):
             if time.monotonic() - began_s > MOVING_S:
                 raise StopTestError(
                     f"the robot did not get going; {role} wrote:\n{self._running[role].tail()}", "Look there."
                 )
             time.sleep(POLL_S)
 
-    def _fast_since(self, began_s: float) -> bool:
-        given, _ = read_journal(self.journal, began_s)
+    def is_fast(self, since_s: float = 0.0) -> bool:
+        """Whether the robot drives as it does when nothing is wrong, and has been told so since a time."""
+        given, _ = read_journal(self.journal, since_s)
         share = CAREFUL if self._stand.fusion else FAST
         return bool(given) and given[-1].linear_m_s > share * self.profile.base.max_linear_m_s
 
