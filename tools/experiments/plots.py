@@ -46,6 +46,7 @@ def intervals(rows: Sequence[Row], thesis: Mapping[str, float]) -> Figure:
         median, low, high = (np.array([float(str(row[key])) for row in shown]) for key in ("median", "low", "high"))
         axes.errorbar(median, np.arange(len(shown)), xerr=[median - low, high - median], fmt="o", color=COLOURS[0])
         axes.set_yticks(np.arange(len(shown)), names)
+        axes.set_ylim(len(shown) - 0.5, -0.5)
         axes.axvline(1.0, color="#9aa1a9", linewidth=0.8)
         if quantity in thesis:
             axes.axvline(thesis[quantity], color=THESIS_COLOUR, linestyle="--", label="thesis")
