@@ -1,11 +1,13 @@
 """Where trials are played: a Dask cluster of real processes on this machine, and what is played again."""
 
+import os
 import shutil
 import socket
 import subprocess
 import sys
+import termios
 import time
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
 import msgspec
@@ -19,6 +21,7 @@ from tools.experiments.fingerprint import code, fingerprint, imported, sources
 from tools.experiments.kept import keep, kept
 from tools.experiments.pools import Cluster, Here
 from tools.experiments.runner import run_trials
+from tools.experiments.trial import play
 from tools.processes import free_port
 
 START_S = 60.0
@@ -112,6 +115,54 @@ def test_an_outcome_of_other_code_is_played_again_and_says_so(world, tmp_path, c
     assert "1 kept trials are of other code" in capsys.readouterr().err
     assert timeless(second) == timeless(first)
     assert kept(trial, tmp_path) == second
+
+
+def test_a_run_that_is_stopped_half_way_goes_on_where_it_was(world, tmp_path):
+    trials = [short_trial(world), short_trial(world, name="hg-dagger", lira=None)]
+
+    def stopped(missing):
+        yield play(missing[0])
+        raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        run_trials(trials, tmp_path, stopped)
+    asked = []
+
+    def going_on(missing):
+        asked.extend(missing)
+        yield from map(play, missing)
+
+    outcomes = run_trials(trials, tmp_path, going_on)
+    assert asked == trials[1:]
+    assert [each.trial for each in outcomes] == trials
+
+
+@pytest.mark.parametrize("terminal", [True, False])
+def test_progress_is_a_bar_on_a_terminal_and_lines_elsewhere(terminal):
+    script = (
+        "import sys; sys.path.insert(0, 'tests/tools')\n"
+        "from made_up_outcomes import outcome\n"
+        "from tools.experiments.runner import Bar\n"
+        "with Bar(3, 1) as bar:\n"
+        "    bar.note(outcome('lira-hold', 7))\n"
+    )
+    ours, theirs = os.openpty() if terminal else os.pipe()
+    if terminal:
+        termios.tcsetwinsize(theirs, (24, 120))
+    where = Path(__file__).parents[2]
+    try:
+        subprocess.run([sys.executable, "-c", script], stderr=theirs, cwd=where, check=True, timeout=60)
+        os.set_blocking(ours, False)
+        pieces = []
+        with suppress(BlockingIOError):
+            while True:
+                pieces.append(os.read(ours, 10_000))
+        shown = b"".join(pieces).decode()
+    finally:
+        os.close(ours)
+        os.close(theirs)
+    assert "[2/3] race lira-hold scripted seed 7: converged after 2 laps, 40 human labels" in shown
+    assert ("| 2/3 [" in shown) is terminal
 
 
 def test_the_fingerprint_follows_the_world_and_the_experts(world, monkeypatch, tmp_path):
