@@ -48,6 +48,18 @@ def test_a_decision_is_kept_alive_and_a_hung_loop_is_not():
         wait_for(lambda: client.drive(Command(GO, client.now())).reason is Reason.NEUTRAL_FIRST)
 
 
+def test_who_has_not_heard_that_the_robot_stopped_does_not_arm_it_with_a_zero():
+    with served(real_time_null()) as robot, remote(robot) as client:
+        get_going(client)
+        wait_for(lambda: client.link._newest.reason is Reason.STALE)
+        told = client.drive(Command(STOP, client.now(), answers=1))
+        assert told.reason is Reason.STALE
+        time.sleep(0.2)
+        assert robot.governed.state == "stopped"
+        wait_for(lambda: client.drive(Command(STOP, client.now(), answers=1)).reason is Reason.OK)
+        assert robot.governed.state == "armed"
+
+
 def test_a_hand_is_not_kept_alive():
     with served(real_time_null()) as robot, remote(robot) as client:
         get_going(client)

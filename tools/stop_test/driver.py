@@ -13,7 +13,7 @@ from queue import SimpleQueue
 from fusion.preprocess import Preprocessor
 from hal.bus import Bus
 from hal.errors import SensorError
-from hal.messages import STOP, Applied, Command, Reason, Twist
+from hal.messages import HELD, STOP, Applied, Command, Reason, Twist
 from hal.remote import RemoteRobot
 from hal.topics import CMD_VEL
 from tools.stop_test.control import Ear, tell_time
@@ -21,7 +21,6 @@ from tools.stop_test.control import Ear, tell_time
 READY = "driving by word"
 FAREWELLS = 3
 HOUR_S = 3600.0
-STOPPED = {Reason.STALE, Reason.NEUTRAL_FIRST, Reason.REFUSED, Reason.ESTOP}
 TWISTS = {"nan": Twist(math.nan, 0.0), "inf": Twist(math.inf, math.inf), "1e308": Twist(1e308, 0.0)}
 STAMPS_S = {"an hour ahead": HOUR_S, "an hour behind": -HOUR_S}
 
@@ -62,7 +61,7 @@ class Driver:
         if self._word == "go" and self._applied.reason is not Reason.OK:
             return STOP
         if not self._sees():
-            return None if self._applied.reason in STOPPED else STOP
+            return None if self._applied.reason in HELD else STOP
         return TWISTS.get(self._word, Twist(self._robot.profile.base.max_linear_m_s, 0.0))
 
     def _sees(self) -> bool:
