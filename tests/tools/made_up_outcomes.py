@@ -6,6 +6,7 @@ from tools.experiments.methods import HG_DAGGER, LIRA
 from tools.experiments.notes import Track
 from tools.experiments.trial import Outcome, Trial
 
+HOLD = LIRA[0].name
 METHODS = {method.name: method for method in (*LIRA, *HG_DAGGER)}
 
 

@@ -12,6 +12,7 @@ from pathlib import Path
 
 import msgspec
 import pytest
+from made_up_outcomes import HOLD
 from short_trials import short_trial, timeless, write_world
 
 from hal.errors import ConfigError
@@ -141,10 +142,10 @@ def test_a_run_that_is_stopped_half_way_goes_on_where_it_was(world, tmp_path):
 def test_progress_is_a_bar_on_a_terminal_and_lines_elsewhere(terminal):
     script = (
         "import sys; sys.path.insert(0, 'tests/tools')\n"
-        "from made_up_outcomes import outcome\n"
+        "from made_up_outcomes import HOLD, outcome\n"
         "from tools.experiments.runner import Bar\n"
         "with Bar(3, 1) as bar:\n"
-        "    bar.note(outcome('lira-hold', 7))\n"
+        "    bar.note(outcome(HOLD, 7))\n"
     )
     ours, theirs = os.openpty() if terminal else os.pipe()
     if terminal:
@@ -161,7 +162,7 @@ def test_progress_is_a_bar_on_a_terminal_and_lines_elsewhere(terminal):
     finally:
         os.close(ours)
         os.close(theirs)
-    assert "[2/3] race lira-hold scripted seed 7: converged after 2 laps, 40 human labels" in shown
+    assert f"[2/3] race {HOLD} scripted seed 7: converged after 2 laps, 40 human labels" in shown
     assert ("| 2/3 [" in shown) is terminal
 
 

@@ -5,7 +5,7 @@ import re
 
 import msgspec
 import pytest
-from made_up_outcomes import lap, outcome
+from made_up_outcomes import HOLD, lap, outcome
 
 from fusion.ledger import Account
 from hal.errors import StorageError
@@ -20,8 +20,8 @@ from tools.experiments.trial import Trial
 
 
 def test_labels_of_a_group_in_the_columns_of_table_2():
-    group = [outcome("lira-hold", seed, labels=labels) for seed, labels in enumerate((10, 20, 60, 40))]
-    row = label_row([*group, outcome("lira-hold", 4, labels=500, converged=False)])
+    group = [outcome(HOLD, seed, labels=labels) for seed, labels in enumerate((10, 20, 60, 40))]
+    row = label_row([*group, outcome(HOLD, 4, labels=500, converged=False)])
     assert (row["n"], row["censored"]) == (5, 1)
     assert (row["human_labels"], row["human_labels_mean"], row["human_labels_iqm"]) == (40, 126, 40)
     assert (row["buffer_first"], row["buffer"]) == (50, 90)
@@ -29,7 +29,7 @@ def test_labels_of_a_group_in_the_columns_of_table_2():
 
 def test_precision_and_recall_are_over_the_whole_group():
     accounts = [Account(call_episodes=4, answered=1, called_for=1), Account(call_episodes=6, answered=4, called_for=3)]
-    group = [outcome("lira-hold", seed, interventions=4, account=each) for seed, each in enumerate(accounts)]
+    group = [outcome(HOLD, seed, interventions=4, account=each) for seed, each in enumerate(accounts)]
     row = effort_row(group)
     assert (row["precision"], row["recall"]) == (5 / 10, 4 / 8)
     silent = effort_row([outcome("hg-dagger")])
@@ -37,7 +37,7 @@ def test_precision_and_recall_are_over_the_whole_group():
 
 
 def test_the_humans_time_is_steps_at_five_hertz_and_the_experts_labels_are_those_of_their_files():
-    row = effort_row([outcome("lira-hold")])
+    row = effort_row([outcome(HOLD)])
     assert row["human_time_s"] == pytest.approx(10.0)
     assert row["human_total"] == 70
     assert row["with_experts"] > row["human_total"]
@@ -49,7 +49,7 @@ def test_only_laps_driven_to_the_end_have_a_time_to_finish():
         lap("unseen", 2, duration_s=90.0, passed=False, collisions=2, lateral_rms_m=0.5),
         lap("unseen", 3, duration_s=60.0, lateral_rms_m=None),
     ]
-    row = driving_row([outcome("lira-hold", laps=(lap(collisions=3), *unseen))])
+    row = driving_row([outcome(HOLD, laps=(lap(collisions=3), *unseen))])
     assert (row["training_collisions"], row["unseen_collisions"]) == (3, 2)
     assert (row["unseen_passed"], row["unseen_laps"]) == (2, 3)
     assert (row["time_to_finish_s"], row["lateral_rms_m"]) == (55.0, 0.375)
@@ -70,7 +70,7 @@ def test_ratios_have_the_columns_that_are_promised():
     rows = compare.ratios(compared(3, converged=False))
     assert len(rows) == len(compare.LIRA) * len(compare.HG_DAGGER) * 2
     assert rows[0] == {
-        "method": "lira-hold", "against": "hg-dagger", "quantity": "human_labels",
+        "method": HOLD, "against": "hg-dagger", "quantity": "human_labels",
         "median": 3.0, "low": 3.0, "high": 3.0, "n": 4, "censored": 4,
     }  # fmt: skip
 
@@ -78,8 +78,8 @@ def test_ratios_have_the_columns_that_are_promised():
 @pytest.mark.parametrize(("theirs", "fewer"), [(3, True), (1, False)])
 def test_a_comparison_agrees_where_the_whole_interval_is_above_one(theirs, fewer):
     found = {finding.key: finding for finding in compare.findings(compared(theirs), "race")}
-    assert found["race.lira-hold.human_labels.fewer"].agrees is fewer
-    assert found["race.lira-hold.human_labels.size"].agrees is False  # neither is 2.65
+    assert found[f"race.{HOLD}.human_labels.fewer"].agrees is fewer
+    assert found[f"race.{HOLD}.human_labels.size"].agrees is False  # neither is 2.65
     assert len({finding.key for finding in found.values()}) == len(found)
 
 
@@ -102,7 +102,7 @@ def test_the_buffer_of_table_c1_has_to_fall_by_five():
         for (theta, keep), buffer in zip(thresholds.THESIS_C1, (1000, second, 30, 30), strict=True):
             for preset in thresholds.HOLD:
                 method = thresholds.method(preset, theta, keep)
-                made = outcome("lira-hold", laps=(lap(buffer=buffer // 2), lap(number=2, buffer=buffer)))
+                made = outcome(HOLD, laps=(lap(buffer=buffer // 2), lap(number=2, buffer=buffer)))
                 outcomes.append(msgspec.structs.replace(made, trial=Trial(method, "eight", 0)))
         found[second] = {finding.key: finding for finding in thresholds.findings(outcomes, "tableC1")}
     assert found[100]["tableC1.thesis.fall"].agrees
@@ -116,12 +116,12 @@ def race():
 
 def test_labels_are_sorted_by_source_and_by_kind():
     rows = {(row["method"], row["source"]): row for row in densities.rows(race())}
-    human, experts = rows["lira-hold", "human"], rows["lira-hold", "experts"]
+    human, experts = rows[HOLD, "human"], rows[HOLD, "experts"]
     assert (human["labels_per_run"], human["straight"], human["full_turn"]) == (2, 0.5, 0.5)
     assert (experts["mid_range_turn"], experts["full_speed"]) == (1.0, 1.0)
     found = {finding.key: finding.agrees for finding in densities.findings(race())}
-    assert found["labels.lira-hold.mid_range"]
-    assert found["labels.lira-hold.share"]
+    assert found[f"labels.{HOLD}.mid_range"]
+    assert found[f"labels.{HOLD}.share"]
     assert not found["labels.hg-dagger.backward"]
 
 
@@ -219,7 +219,7 @@ def test_results_are_written_from_the_summaries_that_are_there(tmp_path, capsys)
     assert main(["experiment", "results", *where]) == 0
     text = out.read_text()
     assert "| [race](#race) | words | 4 | 4 | 4 |" in text
-    assert "| lira-hold | hg-dagger | human_labels | 3 | 3 | 3 | 4 | 0 |" in text
+    assert f"| {HOLD} | hg-dagger | human_labels | 3 | 3 | 3 | 4 | 0 |" in text
     assert text.count("**agrees**") == 4
 
 
@@ -228,7 +228,7 @@ def test_every_cause_of_the_project_explains_an_experiment():
 
 
 def test_final_drives_are_the_last_proving_runs():
-    track = trajectories.final(outcome("lira-hold"))
+    track = trajectories.final(outcome(HOLD))
     assert (track.phase, track.lap) == ("prove", 2)
     row = trajectories.rows(race())[0]
     assert (row["passed"], row["n"], row["mean_speed_m_s"]) == (2, 2, 0.5)

@@ -6,7 +6,8 @@ from functools import partial
 from tools.experiments.experiment import Experiment, Finding, Outcomes, Picture, Row, Table
 from tools.experiments.measures import by_method, driving_row, effort_row, expert_labels, label_row
 from tools.experiments.methods import HG_DAGGER, LIRA
-from tools.experiments.statistics import median_interval, paired_ratios
+from tools.experiments.pairs import bounds, ratio, words
+from tools.experiments.pictures import box_pictures, spelt
 from tools.experiments.trial import Trial
 
 QUANTITIES = ("human_labels", "interventions")
@@ -47,35 +48,16 @@ def summary(outcomes: Outcomes) -> list[Row]:
 
 
 def ratios(outcomes: Outcomes) -> list[Row]:
-    """HG-DAgger over LIRA-SPF, pair by pair of one seed, with 95 % bootstrap intervals of the median.
-
-    `censored` counts pairs in which either run met its cap. Where that is HG-DAgger's, its true ratio is larger.
-    """
+    """HG-DAgger over LIRA-SPF, pair by pair of one seed."""
     groups = by_method(outcomes)
-    rows: list[Row] = []
-    for method in (each.name for each in LIRA if each.name in groups):
-        for against in (each.name for each in HG_DAGGER if each.name in groups):
-            pairs = list(zip(groups[method], groups[against], strict=True))
-            for quantity in QUANTITIES:
-                values = paired_ratios(
-                    [getattr(theirs.result, quantity) for _, theirs in pairs],
-                    [getattr(ours.result, quantity) for ours, _ in pairs],
-                )
-                median, low, high = median_interval(values)
-                censored = sum(not (a.result.converged and b.result.converged) for a, b in pairs)
-                rows.append(
-                    {
-                        "method": method,
-                        "against": against,
-                        "quantity": quantity,
-                        "median": median,
-                        "low": low,
-                        "high": high,
-                        "n": len(pairs),
-                        "censored": censored,
-                    }
-                )
-    return rows
+    return [
+        {"method": method.name, "against": against.name, "quantity": quantity}
+        | ratio(groups[against.name], groups[method.name], quantity)
+        for method in LIRA
+        for against in HG_DAGGER
+        if method.name in groups and against.name in groups
+        for quantity in QUANTITIES
+    ]
 
 
 def amortised(outcomes: Outcomes) -> list[Row]:
@@ -104,11 +86,11 @@ def amortised(outcomes: Outcomes) -> list[Row]:
 
 def tables(outcomes: Outcomes, thesis: Sequence[Row]) -> list[Table]:
     """The methods beside the thesis's, the paired ratios, and what else it took."""
-    words = ", ".join(f"{value:.2f} {quantity}" for quantity, value in THESIS_RATIOS.items())
+    theirs = ", ".join(f"{value:.2f} {spelt(quantity)}" for quantity, value in THESIS_RATIOS.items())
     groups = by_method(outcomes)
     return [
         Table("Labels and interventions until the novice passed its proving run", [*summary(outcomes), *thesis]),
-        Table("HG-DAgger over LIRA-SPF, by pairs of one seed", ratios(outcomes), f"Thesis, Table II: {words}."),
+        Table("HG-DAgger over LIRA-SPF, by pairs of one seed", ratios(outcomes), f"Thesis, Table II: {theirs}."),
         Table("Calls and the human's time", [{"method": name} | effort_row(group) for name, group in groups.items()]),
         Table("Driving", [{"method": name} | driving_row(group) for name, group in groups.items()]),
         Table("Labels that trained the experts, paid back", amortised(outcomes), "Labels are medians over the seeds."),
@@ -121,14 +103,13 @@ def findings(outcomes: Outcomes, name: str) -> list[Finding]:
     for row in ratios(outcomes):
         if row["against"] != HG_DAGGER[0].name:
             continue
-        method, quantity = str(row["method"]), str(row["quantity"])
-        median, low, high = (float(str(row[each])) for each in ("median", "low", "high"))
-        ours = f"{median:.2f} [{low:.2f}, {high:.2f}], n {row['n']}, {row['censored']} censored"
-        theirs, words = THESIS_RATIOS[quantity], quantity.replace("_", " ")
-        key = f"{name}.{method}.{quantity}"
-        claim = f"HG-DAgger over {method}, {words}"
-        found.append(Finding(f"{key}.fewer", f"{claim}: above 1", f"{theirs:.2f}", ours, low > 1.0))
-        found.append(Finding(f"{key}.size", f"{claim}: as in Table II", f"{theirs:.2f}", ours, low <= theirs <= high))
+        method, quantity = row["method"], str(row["quantity"])
+        (low, high), theirs = bounds(row), THESIS_RATIOS[quantity]
+        key, claim = f"{name}.{method}.{quantity}", f"HG-DAgger over {method}, {spelt(quantity)}"
+        found += [
+            Finding(f"{key}.fewer", f"{claim}: above 1", f"{theirs:.2f}", words(row), low > 1.0),
+            Finding(f"{key}.size", f"{claim}: as in Table II", f"{theirs:.2f}", words(row), low <= theirs <= high),
+        ]
     return found
 
 
@@ -136,23 +117,9 @@ def figures(outcomes: Outcomes) -> list[Picture]:
     """Figures 11 and 12, and the ratios."""
     from tools.experiments import plots
 
-    groups = by_method(outcomes)
-    cut = {name: [not each.result.converged for each in group] for name, group in groups.items()}
-    pictures = [
-        Picture(
-            quantity,
-            f"{quantity.replace('_', ' ').capitalize()} until the novice passed; a cross is a run that never did",
-            partial(
-                plots.boxes,
-                {name: [getattr(each.result, quantity) for each in group] for name, group in groups.items()},
-                cut,
-                quantity.replace("_", " "),
-            ),
-        )
-        for quantity in QUANTITIES
-    ]
-    words = "HG-DAgger over LIRA-SPF, pair by pair: medians and 95 % intervals"
-    return [*pictures, Picture("ratios", words, partial(plots.intervals, ratios(outcomes), THESIS_RATIOS))]
+    caption = "HG-DAgger over LIRA-SPF, pair by pair: medians and 95 % intervals"
+    drawn = Picture("ratios", caption, partial(plots.intervals, ratios(outcomes), THESIS_RATIOS))
+    return [*box_pictures(by_method(outcomes), QUANTITIES), drawn]
 
 
 EXPERIMENTS = {

@@ -1,6 +1,6 @@
 """The human's faults: a perfect, a skilled and an unskilled teacher, and one fault at a time, on line-obstacles."""
 
-from functools import partial
+from dataclasses import replace
 
 import msgspec
 
@@ -8,7 +8,8 @@ from fusion.teacher import PERFECT, TEACHERS, UNSKILLED, TeacherSettings
 from tools.experiments.experiment import Experiment, Finding, Outcomes, Picture, Row, Table
 from tools.experiments.measures import driving_row, effort_row, grouped, label_row
 from tools.experiments.methods import HG_DAGGER, LIRA
-from tools.experiments.statistics import median_interval, paired_ratios
+from tools.experiments.pairs import bounds, ratio, words
+from tools.experiments.pictures import box_pictures
 from tools.experiments.trial import Outcome, Trial
 
 WORLD = "line-obstacles"
@@ -65,28 +66,11 @@ def summary(outcomes: Outcomes) -> list[Row]:
 def cost(outcomes: Outcomes) -> list[Row]:
     """Human labels with a faulty teacher over those with the perfect one, by pairs of one seed."""
     found = groups(outcomes)
-    rows: list[Row] = []
-    for (teacher, method), group in found.items():
-        if teacher == "perfect":
-            continue
-        perfect = found["perfect", method]
-        values = paired_ratios(
-            [each.result.human_labels for each in group], [each.result.human_labels for each in perfect]
-        )
-        median, low, high = median_interval(values)
-        cut = sum(not (a.result.converged and b.result.converged) for a, b in zip(group, perfect, strict=True))
-        rows.append(
-            {
-                "teacher": teacher,
-                "method": method,
-                "median": median,
-                "low": low,
-                "high": high,
-                "n": len(values),
-                "censored": cut,
-            }
-        )
-    return rows
+    return [
+        {"teacher": teacher, "method": method} | ratio(group, found["perfect", method], "human_labels")
+        for (teacher, method), group in found.items()
+        if teacher != "perfect"
+    ]
 
 
 def tables(outcomes: Outcomes) -> list[Table]:
@@ -104,8 +88,8 @@ def findings(outcomes: Outcomes) -> list[Finding]:
             f"teacher.{row['teacher']}.{row['method']}",
             f"{row['method']}: a {row['teacher']} teacher gives more labels than a perfect one",
             "significant influence",
-            f"{row['median']:.2f} times [{row['low']:.2f}, {row['high']:.2f}], {row['censored']} censored",
-            float(str(row["low"])) > 1.0,
+            words(row),
+            bounds(row)[0] > 1.0,
         )
         for row in cost(outcomes)
         if row["teacher"] in ("scripted", "unskilled")
@@ -114,17 +98,14 @@ def findings(outcomes: Outcomes) -> list[Finding]:
 
 def figures(outcomes: Outcomes) -> list[Picture]:
     """Labels by teacher, one drawing per method."""
-    from tools.experiments import plots
-
     found = groups(outcomes)
-    pictures = []
-    for method in METHODS:
-        mine = {teacher: group for (teacher, name), group in found.items() if name == method.name}
-        values = {teacher: [each.result.human_labels for each in group] for teacher, group in mine.items()}
-        cut = {teacher: [not each.result.converged for each in group] for teacher, group in mine.items()}
-        words = f"{method.name}: human labels by teacher; a cross is a run that did not converge"
-        pictures.append(Picture(method.name, words, partial(plots.boxes, values, cut, "human labels")))
-    return pictures
+    return [
+        replace(picture, name=f"{method.name}-{picture.name}", words=f"{method.name}: {picture.words}")
+        for method in METHODS
+        for picture in box_pictures(
+            {teacher: group for (teacher, name), group in found.items() if name == method.name}, ("human_labels",)
+        )
+    ]
 
 
 EXPERIMENTS = {"teacher": Experiment(trials=trials, tables=tables, findings=findings, figures=figures)}
