@@ -10,6 +10,7 @@ its own stamp and never repeated.
 import math
 import threading
 import time
+from dataclasses import replace
 
 from hal.bus import Bus, Publisher
 from hal.clock import ClockEstimate
@@ -58,6 +59,14 @@ class RealTimeLink:
             if time.monotonic() > deadline_s:
                 raise BusError("the robot says nothing about its wheels", "Look whether it still runs.")
             time.sleep(POLL_S)
+
+    def stand(self) -> None:
+        """Have the robot stand until the next decision: what was decided before a reset does not drive after it."""
+        with self._heard:
+            for source, command in list(self._held.items()):
+                now_s = self._clock.now(time.monotonic())
+                self._held[source] = replace(command, twist=STOP, stamp_s=now_s)
+                self._send_held(now_s, self._held[source])
 
     def refresh(self, reset_s: float) -> None:
         """Forget what was captured before a reset, and wait a moment for what comes after it."""

@@ -14,10 +14,10 @@ from hal.bus import Bus
 from hal.codec import encode
 from hal.errors import BusError, DeviceError
 from hal.governed import GovernedRobot
-from hal.messages import STOP, Command, DepthImage, Reason, Source, Twist
+from hal.messages import STOP, Command, DepthImage, Episode, Reason, Source, Twist
 from hal.null import NullRobot
 from hal.profile import STOP_BUDGET_S
-from hal.remote import RemoteRobot
+from hal.remote import RemoteArena, RemoteRobot
 from hal.remote_realtime import DECISION_S
 from hal.server import HalServer
 from hal.topics import APPLIED, CMD_VEL, DEPTH
@@ -58,6 +58,16 @@ def test_who_has_not_heard_that_the_robot_stopped_does_not_arm_it_with_a_zero():
         assert robot.governed.state == "stopped"
         wait_for(lambda: client.drive(Command(STOP, client.now(), answers=1)).reason is Reason.OK)
         assert robot.governed.state == "armed"
+
+
+def test_what_was_decided_before_a_reset_does_not_drive_after_it():
+    with served(real_time_null()) as robot, remote(robot) as client:
+        get_going(client)
+        RemoteArena(client).reset(Episode())
+        put_down_m = robot.inner.state().x_m
+        time.sleep(DECISION_S)
+        assert robot.inner.state().x_m == put_down_m
+        get_going(client)
 
 
 def test_a_hand_is_not_kept_alive():
