@@ -7,8 +7,8 @@ command the wheels had zero, how far the robot went, how many stale commands it 
 unasked. The exit status is 1 if any row fails.
 
 examples:
-  lira stop-test                        the whole matrix, about six minutes
-  lira stop-test --quick                a part of it, once each, in a minute
+  lira stop-test                        the whole matrix, about ten minutes
+  lira stop-test --quick                a part of it, once each, in a minute or two
   lira stop-test --only lidar           the rows with that word in their name
   lira stop-test --json -               one JSON object on standard output
 """
