@@ -15,6 +15,7 @@ from tools.report.plots import BINS, PUT_BACK_M
 
 # Okabe and Ito: told apart by people with any colour vision.
 COLOURS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#8a6d00", "#626b75")
+AROUND_M = 1.0
 THESIS_COLOUR = "#000000"
 
 
@@ -102,6 +103,7 @@ def top_view(world: str, tracks: Mapping[str, Track], full_speed_m_s: float) -> 
             drawn = _draw(axes, world, track, full_speed_m_s)
             axes.set_title(f"{name}, part {part + 1} of {parts}" if long else name, fontsize=9)
             if long:
+                axes.set_ylim(min(track.y_mm) / 1000 - AROUND_M, max(track.y_mm) / 1000 + AROUND_M)
                 axes.set_xlim(left + (right - left) * part / parts, left + (right - left) * (part + 1) / parts)
     if drawn is not None:
         figure.colorbar(drawn, ax=list(panels), label="speed, m/s", shrink=0.8)
@@ -130,5 +132,5 @@ def _draw(axes: Axes, world: str, track: Track, full_speed_m_s: float) -> LineCo
     axes.add_collection(drive)
     axes.scatter(xy[:, 0], xy[:, 1], c=speed, s=4, cmap="viridis", vmin=0.0, vmax=full_speed_m_s, zorder=4)
     axes.plot(*xy[0], "o", color="black", zorder=5)
-    axes.set_aspect("equal", adjustable="datalim")
+    axes.set_aspect("equal")
     return drive
