@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 from functools import partial
 
+from fusion.tasks import task_of
 from tools.experiments.experiment import Experiment, Finding, Outcomes, Picture, Row, Table
 from tools.experiments.measures import by_method, driving_row, effort_row, expert_labels, label_row
 from tools.experiments.methods import HG_DAGGER, LIRA
@@ -67,7 +68,7 @@ def amortised(outcomes: Outcomes) -> list[Row]:
     """
     groups = by_method(outcomes)
     cost = {name: effort_row(group)["human_total"] for name, group in groups.items()}
-    experts = sum(expert_labels().values())
+    experts = sum(expert_labels(task_of(outcomes[0].trial.world)).values())
     rows: list[Row] = []
     for method in (each.name for each in LIRA if each.name in groups):
         for against in (each.name for each in HG_DAGGER if each.name in groups):

@@ -8,6 +8,7 @@ from pathlib import Path
 import msgspec
 
 from fusion.expert_files import SHIPPED, shipped_path
+from fusion.tasks import TASKS, task_of
 from hal.profile import load_profile
 from sim_backend.catalogue import load_world
 
@@ -17,15 +18,17 @@ OURS = ("hal", "fusion", "sim_backend", "tools")
 
 
 @cache
-def fingerprint(world: str, profile_name: str) -> str:
+def fingerprint(world: str) -> str:
     """Return 16 hex digits that change with anything a trial on this world could come out differently for.
 
-    Of the code, what `START` imports counts, without comments and docstrings.
+    Of the code, what `START` imports counts, without comments and docstrings; of robots and experts, those of the
+    world's task.
     """
-    profile = load_profile(profile_name)
+    task = task_of(world)
+    profile = load_profile(TASKS[task].profile)
     parts = [code(path) for path in sources(START)]
     parts += [msgspec.json.encode(each) for each in (load_world(world), profile)]
-    parts += [path.read_bytes() for path in (shipped_path(name, profile) for name in SHIPPED) if path.exists()]
+    parts += [path.read_bytes() for path in (shipped_path(name, profile, task) for name in SHIPPED) if path.exists()]
     return hashlib.sha256(b"".join(hashlib.sha256(part).digest() for part in parts)).hexdigest()[:16]
 
 

@@ -6,10 +6,11 @@ from functools import cache
 import numpy as np
 
 from fusion.record import LapRecord
+from fusion.tasks import TASKS, task_of
 from hal.profile import load_profile
 from tools.experiments.experiment import Outcomes, Row
 from tools.experiments.statistics import iqm
-from tools.experiments.trial import PROFILE, Outcome
+from tools.experiments.trial import Outcome
 
 
 def grouped(outcomes: Outcomes, key: Callable[[Outcome], str]) -> dict[str, list[Outcome]]:
@@ -53,7 +54,8 @@ def effort_row(group: Sequence[Outcome]) -> Row:
     which every novice here begins with.
     """
     accounts = [outcome.result.account for outcome in group]
-    period_s = load_profile(PROFILE).period_s
+    task = task_of(group[0].trial.world)
+    period_s = load_profile(TASKS[task].profile).period_s
     shown = [outcome.result.demonstration for outcome in group]
     episodes = sum(each.call_episodes for each in accounts)
     wanted = sum(outcome.result.interventions for outcome in group) if episodes else 0
@@ -70,7 +72,7 @@ def effort_row(group: Sequence[Outcome]) -> Row:
         "slowed_steps": median([each.slowed_steps for each in accounts]),
         "switches": median([each.switches for each in accounts]),
         "human_total": median(totals),
-        "with_experts": median(totals) + sum(expert_labels().values()),
+        "with_experts": median(totals) + sum(expert_labels(task).values()),
     }
 
 
@@ -102,13 +104,13 @@ def experts_share(counts: dict[str, int]) -> int:
 
 
 @cache
-def expert_labels() -> dict[str, int]:
-    """Labels that trained each expert, from its file; an expert of an older version counts nothing."""
+def expert_labels(task: str) -> dict[str, int]:
+    """Labels that trained each expert of a task, from its file; an expert of an older version counts nothing."""
     from fusion.expert_files import SHIPPED
     from fusion.experts import load_network
 
-    profile = load_profile(PROFILE)
-    return {name: load_network(f"{name}-expert", profile)[1].labels or 0 for name in SHIPPED}
+    profile = load_profile(TASKS[task].profile)
+    return {name: load_network(f"{name}-expert", profile, task)[1].labels or 0 for name in SHIPPED}
 
 
 def median(values: Sequence[float]) -> float:

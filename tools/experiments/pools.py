@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 from hal.errors import ConfigError
 from tools.experiments.fingerprint import fingerprint
-from tools.experiments.trial import PROFILE, Outcome, Trial, play
+from tools.experiments.trial import Outcome, Trial, play
 
 if TYPE_CHECKING:
     from distributed import Client
@@ -58,8 +58,8 @@ class Cluster:
         if max(threads.values()) > 1:
             raise ConfigError("a worker of the cluster has more than one thread", f"Start it again: {start}")
         for world in {trial.world for trial in trials}:
-            ours = fingerprint(world, PROFILE)
-            for worker, theirs in client.run(fingerprint, world, PROFILE).items():
+            ours = fingerprint(world)
+            for worker, theirs in client.run(fingerprint, world).items():
                 if theirs != ours:
                     raise ConfigError(
                         f"the worker {worker} has other code or other experts than this machine",

@@ -11,7 +11,7 @@ from tqdm import tqdm
 
 from tools.experiments.fingerprint import fingerprint
 from tools.experiments.kept import keep, kept
-from tools.experiments.trial import PROFILE, Outcome, Trial
+from tools.experiments.trial import Outcome, Trial
 
 Pool = Callable[[Sequence[Trial]], Iterator[Outcome]]
 """Plays trials and yields what came of them, in whatever order they end."""
@@ -22,7 +22,7 @@ def run_trials(trials: Sequence[Trial], folder: Path, pool: Pool) -> list[Outcom
 
     An outcome of other code or other experts is played again. Progress goes to standard error. Raises `StorageError`.
     """
-    prints = {world: fingerprint(world, PROFILE) for world in {trial.world for trial in trials}}
+    prints = {world: fingerprint(world) for world in {trial.world for trial in trials}}
     done: dict[Trial, Outcome] = {}
     outdated = 0
     for trial in trials:
