@@ -162,7 +162,7 @@ EXPERIMENTS = {"race": lambda: compared(3), "labels": race, "trajectories": race
 def test_a_page_holds_tables_verdicts_and_drawings_and_needs_nothing_else(tmp_path, name):
     outcomes = EXPERIMENTS[name]()
     experiment = load(name)
-    summary = summarise(name, REGISTRY[name].words, 4, experiment, outcomes)
+    summary = summarise(name, REGISTRY[name].words, "command", 4, experiment, outcomes)
     pictures = experiment.figures(outcomes)
     page = write_page(tmp_path, summary, pictures).read_text()
     assert page.count("<table>") == len(summary.tables) + 1
@@ -175,14 +175,14 @@ def test_a_page_holds_tables_verdicts_and_drawings_and_needs_nothing_else(tmp_pa
 
 def test_a_place_where_no_page_can_be_written_is_named(tmp_path):
     (tmp_path / "file").write_text("")
-    summary = summarise("race", "words", 4, load("race"), compared(3))
+    summary = summarise("race", "words", "command", 4, load("race"), compared(3))
     no_pictures: list[Picture] = []
     with pytest.raises(StorageError, match="cannot write into"):
         write_page(tmp_path / "file", summary, no_pictures)
 
 
 def test_a_summary_survives_its_file(tmp_path):
-    summary = summarise("race", "words", 4, load("race"), compared(3))
+    summary = summarise("race", "words", "command", 4, load("race"), compared(3))
     path = tmp_path / "race.json"
     path.write_text(to_json(summary))
     assert read_summary(path) == summary
@@ -215,7 +215,7 @@ def test_results_are_written_from_the_summaries_that_are_there(tmp_path, capsys)
     where = ["--summaries", str(tmp_path), "--out", str(out)]
     assert main(["experiment", "results", *where]) == 2
     assert "holds no summary" in capsys.readouterr().err
-    (tmp_path / "race.json").write_text(to_json(summarise("race", "words", 4, load("race"), compared(3))))
+    (tmp_path / "race.json").write_text(to_json(summarise("race", "words", "command", 4, load("race"), compared(3))))
     assert main(["experiment", "results", *where]) == 0
     text = out.read_text()
     assert "| [race](#race) | words | 4 | 4 | 4 |" in text
@@ -232,3 +232,17 @@ def test_final_drives_are_the_last_proving_runs():
     assert (track.phase, track.lap) == ("prove", 2)
     row = trajectories.rows(race())[0]
     assert (row["passed"], row["n"], row["mean_speed_m_s"]) == (2, 2, 0.5)
+
+
+def test_some_methods_may_be_played_alone(capsys, tmp_path):
+    alone = [each for each in compared(3) if each.trial.method.name == HOLD]
+    race = load("race")
+    assert race.ratios(alone) == []
+    assert [len(table.rows) for table in race.tables(alone)] == [1, 1, 1]
+    assert [picture.name for picture in race.figures(alone)] == ["human_labels", "interventions"]
+    where = ["--run", str(tmp_path), "--methods", f"{HOLD},hg"]
+    assert main(["experiment", "race", *where]) == 2
+    assert "race has no method 'hg'" in capsys.readouterr().err
+    for name in ("tableC1", "all"):
+        assert main(["experiment", name, *where]) == 2
+        assert f"{name} takes no --methods" in capsys.readouterr().err

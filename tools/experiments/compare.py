@@ -89,13 +89,14 @@ def tables(outcomes: Outcomes, thesis: Sequence[Row]) -> list[Table]:
     """The methods beside the thesis's, the paired ratios, and what else it took."""
     theirs = ", ".join(f"{value:.2f} {spelt(quantity)}" for quantity, value in THESIS_RATIOS.items())
     groups = by_method(outcomes)
-    return [
+    found = [
         Table("Labels and interventions until the novice passed its proving run", [*summary(outcomes), *thesis]),
         Table("HG-DAgger over LIRA-SPF, by pairs of one seed", ratios(outcomes), f"Thesis, Table II: {theirs}."),
         Table("Calls and the human's time", [{"method": name} | effort_row(group) for name, group in groups.items()]),
         Table("Driving", [{"method": name} | driving_row(group) for name, group in groups.items()]),
         Table("Labels that trained the experts, paid back", amortised(outcomes), "Labels are medians over the seeds."),
     ]
+    return [table for table in found if table.rows]
 
 
 def findings(outcomes: Outcomes, name: str) -> list[Finding]:
@@ -118,9 +119,10 @@ def figures(outcomes: Outcomes) -> list[Picture]:
     """Figures 11 and 12, and the ratios."""
     from tools.experiments import plots
 
+    pictures, rows = box_pictures(by_method(outcomes), QUANTITIES), ratios(outcomes)
     caption = "HG-DAgger over LIRA-SPF, pair by pair: medians and 95 % intervals"
-    drawn = Picture("ratios", caption, partial(plots.intervals, ratios(outcomes), THESIS_RATIOS))
-    return [*box_pictures(by_method(outcomes), QUANTITIES), drawn]
+    drawn = Picture("ratios", caption, partial(plots.intervals, rows, THESIS_RATIOS))
+    return [*pictures, drawn] if rows else pictures
 
 
 EXPERIMENTS = {
@@ -130,6 +132,7 @@ EXPERIMENTS = {
         findings=partial(findings, name=name),
         figures=figures,
         ratios=ratios,
+        methods=tuple(method.name for method in (*LIRA, *HG_DAGGER)),
     )
     for name, world, thesis in (("table2", "line-obstacles", THESIS), ("race", "race", []))
 }

@@ -28,13 +28,13 @@ class Summary(msgspec.Struct, frozen=True):
     findings: list[Finding]
 
 
-def summarise(name: str, words: str, seeds: int, experiment: Experiment, outcomes: Outcomes) -> Summary:
+def summarise(name: str, words: str, command: str, seeds: int, experiment: Experiment, outcomes: Outcomes) -> Summary:
     """Reduce outcomes to what is kept."""
     tables = experiment.tables(outcomes)
     return Summary(
         name=name,
         words=words,
-        command=f"lira experiment {name} --seeds {seeds}",
+        command=command,
         seeds=seeds,
         trials=len(outcomes),
         machine_s=round(sum(outcome.result.elapsed_s for outcome in outcomes), 1),

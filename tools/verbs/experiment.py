@@ -9,12 +9,14 @@ used by then. The folder also gets a page (NAME.html) and the drawings.
 
 examples:
   lira experiment table2 --seeds 10 --workers 2
+  lira experiment table2 --seeds 10 --workers 2 --methods hold,hg-dagger
   lira experiment race --seeds 10 --scheduler tcp://192.168.1.5:8786 --json race.json
   lira experiment all --seeds 10 --workers 2
   lira experiment results
 """
 
 import argparse
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -34,6 +36,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add = parser.add_argument
     add("name", choices=[*REGISTRY, ALL, RESULTS], metavar="NAME", help=f"{names}; {ALL}; {RESULTS}")
     add("--seeds", type=int, default=3, help="repetitions, seeds 0, 1, 2, ... (default: %(default)s)")
+    add("--methods", metavar="NAMES", help="of table2 and race, play only these, separated by commas")
     add("--workers", type=int, default=1, help="processes side by side (default: %(default)s)")
     add("--scheduler", metavar="ADDRESS", help="run on this Dask cluster instead, like tcp://192.168.1.5:8786")
     add("--run", type=Path, default=FOLDER, metavar="DIR", help="keeps the trials and pages (default: %(default)s)")
@@ -71,9 +74,24 @@ def play(args: argparse.Namespace, name: str) -> "tuple[Summary, Path]":
 
     experiment = load(name)
     pool = Here(args.workers) if args.scheduler is None else Cluster(args.scheduler)
-    outcomes = run_trials(experiment.trials(args.seeds), args.run, pool)
-    summary = summarise(name, REGISTRY[name].words, args.seeds, experiment, outcomes)
+    chosen = chosen_methods(args.methods, experiment.methods, name)
+    trials = [trial for trial in experiment.trials(args.seeds) if not chosen or trial.method.name in chosen]
+    outcomes = run_trials(trials, args.run, pool)
+    command = f"lira experiment {name} --seeds {args.seeds}" + (f" --methods {args.methods}" if chosen else "")
+    summary = summarise(name, REGISTRY[name].words, command, args.seeds, experiment, outcomes)
     return summary, write_page(args.run, summary, experiment.figures(outcomes))
+
+
+def chosen_methods(words: str | None, known: Sequence[str], name: str) -> set[str]:
+    """Return the methods that were asked for; nothing means all. Raises `ConfigError`."""
+    if words is None:
+        return set()
+    if not known:
+        raise ConfigError(f"{name} takes no --methods", "It needs all of its methods together.")
+    chosen = set(words.split(","))
+    if not chosen <= set(known):
+        raise ConfigError(f"{name} has no method '{min(chosen - set(known))}'", f"Known: {', '.join(known)}.")
+    return chosen
 
 
 def show(summary: "Summary", page: Path) -> None:
@@ -98,6 +116,8 @@ def write_results(args: argparse.Namespace) -> int:
     from tools.experiments.summary import read_summaries, to_json
     from tools.verbs.bench import write_file
 
+    if args.methods is not None:
+        raise ConfigError(f"{args.name} takes no --methods", "It is about all of them.")
     folder = args.summaries or document.SUMMARIES
     for name in REGISTRY if args.name == ALL else ():
         print(f"\n{name}: {REGISTRY[name].words}")
