@@ -2,9 +2,11 @@
 PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
+SEEDS := 10
+WORKERS := 2
 BENCHES := twin lockstep latency train preprocess drivers takeover
 
-.PHONY: setup demo test check bench clean
+.PHONY: setup demo test check bench results clean
 
 setup: $(VENV)/.installed
 
@@ -31,6 +33,10 @@ check: setup
 bench: setup
 	@mkdir -p runs/bench
 	@for name in $(BENCHES); do $(BIN)/lira bench $$name --json runs/bench/$$name.json || exit 1; done
+
+# Every experiment of the thesis, then RESULTS.md. It goes on where it was stopped.
+results: setup
+	$(BIN)/lira experiment all --seeds $(SEEDS) --workers $(WORKERS)
 
 clean:
 	rm -rf $(VENV) runs

@@ -7,12 +7,10 @@ from typing import Protocol
 from fusion.method import STAND, Choice, Chooser, Lesson, Method, Policy, Proposal
 from fusion.preprocess import Features, Preprocessor
 from hal.errors import SensorError
+from hal.messages import HELD as HELD
 from hal.messages import STOP, Action, Applied, Command, CourseState, Observation, Reason, Source, Twist
 from hal.port import Robot
 from hal.profile import Base
-
-# A robot that stopped by itself is armed by the next zero; that has to be a person's, not that of a stale sensor.
-HELD = frozenset({Reason.STALE, Reason.NEUTRAL_FIRST, Reason.REFUSED, Reason.ESTOP})
 
 
 class Teacher(Protocol):
@@ -69,8 +67,14 @@ class ControlLoop:
         self.trouble = ""  # what was wrong with the newest observation
 
     def arm(self) -> None:
-        """Send the neutral command that a stopped robot asks for before it moves, and let one period pass."""
-        self._robot.drive(Command(STOP, self._robot.now(), answers=self._robot.read().seq))
+        """Send the neutral command that a stopped robot asks for before it moves, and let one period pass.
+
+        Once more if the answer is that it stands: a remote robot says so first, and is armed by who knows it.
+        """
+        for _ in range(2):
+            stop = Command(STOP, self._robot.now(), answers=self._robot.read().seq)
+            if self._robot.drive(stop).reason not in HELD:
+                break
         self._keep_time()
 
     def step(self, method: Method, teacher: Teacher | None = None) -> Step | None:

@@ -1,54 +1,48 @@
-"""What the two experts are trained on (appendix E.1): the world, the drives, and how strict the teacher is."""
+"""What each task's two experts are trained on: the world, the drives, and how strict the teacher is."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
+import msgspec
+
 from fusion.session import Drive
-from fusion.teacher import TeacherSettings
+from fusion.tasks import DEFAULT, TASKS
+from fusion.teacher import PERFECT, TeacherSettings
 from hal.messages import Episode
 
 
 @dataclass(frozen=True, slots=True)
 class Curriculum:
-    """A training course for one single-sensor expert."""
+    """A training course for one single-sensor expert.
+
+    `cruise_world` shows the sensor nothing for the first `cruise_steps`: the cruise action is measured there.
+    """
 
     world: str
     teacher: TeacherSettings
     drives: tuple[Drive, ...]
     laps: int
+    cruise_world: str = "straight"
+    cruise_steps: int = 25
 
 
-def _camera() -> Curriculum:
+STRICT = msgspec.structs.replace(PERFECT, style="proportional")  # experts are to be good: shown without faults
+
+
+def _line_camera() -> Curriculum:
     """A lap of the curved line, then starts beside it and askew: the expert has to find its way back (fig. E.2b)."""
     askew = [(0.5, -0.3), (-0.5, 0.3), (0.9, -0.6), (-0.9, 0.6), (0.9, 0.0), (-0.9, 0.0), (0.3, 0.5), (-0.3, -0.5)]
     recoveries = [
         Drive(Episode(0, start_m=3.0 + 4.0 * k, lateral_m=lateral, yaw_rad=yaw), 8.0, "stay", final_lateral_m=0.35)
         for k, (lateral, yaw) in enumerate(askew)
     ]
-    teacher = TeacherSettings(
-        style="proportional",
-        lateral_m=0.2,
-        delay_s=0.0,
-        called_delay_s=0.0,
-        gain_sigma=0.0,
-        wrong_direction=0,
-        missed=0,
-    )
+    teacher = msgspec.structs.replace(STRICT, lateral_m=0.2)
     return Curriculum("line", teacher, (Drive(Episode(0), 300.0), *recoveries), laps=12)
 
 
-def _lidar() -> Curriculum:
+def _line_lidar() -> Curriculum:
     """Forests from sparse to dense, straight on until something is in the way (fig. E.1)."""
-    teacher = TeacherSettings(
-        style="proportional",
-        margin_m=0.2,
-        horizon_s=2.0,
-        follow_line=False,
-        delay_s=0.0,
-        called_delay_s=0.0,
-        gain_sigma=0.0,
-        wrong_direction=0,
-        missed=0,
-    )
+    teacher = msgspec.structs.replace(STRICT, margin_m=0.2, horizon_s=2.0, follow_line=False)
     askew = [(0.15, 0.0), (-0.15, 0.0), (0.3, 0.1), (-0.3, -0.1), (0.0, 0.2), (0.0, -0.2)]
     drives = tuple(
         Drive(Episode(layout, lateral_m=lateral, yaw_rad=yaw), 60.0, "stay")
@@ -57,4 +51,62 @@ def _lidar() -> Curriculum:
     return Curriculum("forest", teacher, drives, laps=12)
 
 
-CURRICULA = {"camera": _camera(), "lidar": _lidar()}
+def _passage() -> Curriculum:
+    """Openings, corridors, walls and boxes, the same for both sensors; straight on where there are none (fig. 6).
+
+    Each from a few metres before it: nothing on the open floor between them tells a sensor which way leads on.
+    """
+    teacher = msgspec.structs.replace(STRICT, margin_m=0.12, lateral_m=1.5, stray_m=0.5)
+    wide = ((10.5, 6.0), (15.3, 7.5), (31.5, 6.5), (37.8, 6.5), (43.5, 8.0), (51.0, 6.0))
+    through = [
+        Drive(Episode(0, start_m=start, lateral_m=lateral), limit_s, "stay", final_lateral_m=0.5)
+        for lateral in (0.0, 0.15, -0.15)
+        for start, limit_s in wide
+    ]
+    around = [Drive(Episode(layout, start_m=start), 10.0, "stay") for layout in range(3) for start in (1.0, 21.5)]
+    return Curriculum("passage-train", teacher, (*through, *around), laps=12, cruise_world="passage", cruise_steps=10)
+
+
+def _garden_camera() -> Curriculum:
+    """Along the steel edge without the box, from the start and from beside the way (fig. 14)."""
+    return _edge("garden-train", askew=[(0.2, -0.2), (-0.15, 0.2), (0.3, 0.0), (-0.15, 0.0)], starts=(1.0, 6.0))
+
+
+def _garden_lidar() -> Curriculum:
+    """Put before boxes in the open, nearer and farther to either side (fig. F.1)."""
+    teacher = msgspec.structs.replace(STRICT, margin_m=0.15, horizon_s=3.0, follow_line=False)
+    places = [(2.8, 0.1), (2.8, -0.1), (3.0, 0.25), (3.0, -0.25), (2.6, 0.4), (2.6, -0.4)]
+    drives = tuple(
+        Drive(Episode(layout, start_m=start, lateral_m=lateral), 30.0, "stay")
+        for layout, (start, lateral) in enumerate(places)
+    )
+    return Curriculum("forest", teacher, drives, laps=12)
+
+
+def _corridor_camera() -> Curriculum:
+    """Down the middle of the corridor, with white spots alone on its floor (fig. F.2a)."""
+    return _edge("corridor-train", askew=[(0.4, 0.0), (-0.4, 0.0), (0.3, 0.3), (-0.3, -0.3)], starts=(4.0, 14.0))
+
+
+def _edge(world: str, askew: Sequence[tuple[float, float]], starts: Sequence[float]) -> Curriculum:
+    """The whole way at the real robot's pace, then back to it from places and headings beside it."""
+    teacher = msgspec.structs.replace(STRICT, lateral_m=0.2, stray_m=0.2, horizon_s=2.0)
+    recoveries = [
+        Drive(Episode(k, start_m=start, lateral_m=lateral, yaw_rad=yaw), 12.0, "stay", final_lateral_m=0.2)
+        for start in starts
+        for k, (lateral, yaw) in enumerate(askew)
+    ]
+    return Curriculum(world, teacher, (*recoveries, Drive(Episode(0), 240.0)), laps=12, cruise_world=world)
+
+
+CURRICULA = {
+    DEFAULT: {"camera": _line_camera(), "lidar": _line_lidar()},
+    "passage": {"camera": _passage(), "lidar": _passage()},
+    "garden": {"camera": _garden_camera(), "lidar": _garden_lidar()},
+    "corridor": {"camera": _corridor_camera()},
+}
+
+
+def curriculum(kind: str, task: str) -> Curriculum:
+    """Return what a task's expert is trained on; a lidar expert may be another task's, see `Task`."""
+    return CURRICULA[TASKS[task].lidar if kind == "lidar" else task][kind]

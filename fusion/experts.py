@@ -5,14 +5,15 @@ from fusion.expert_files import expert_path
 from fusion.method import Expert
 from fusion.networks import Network
 from fusion.preprocess import Features
+from fusion.tasks import DEFAULT
 from hal.errors import ConfigError
 from hal.messages import Action
 from hal.profile import RobotProfile
 
 
-def load_network(name_or_path: str, profile: RobotProfile) -> tuple[Network, Checkpoint]:
+def load_network(name_or_path: str, profile: RobotProfile, pair: str = DEFAULT) -> tuple[Network, Checkpoint]:
     """Load a policy and check that it fits the robot. Raises `ConfigError` or `StorageError`."""
-    path = expert_path(name_or_path, profile)
+    path = expert_path(name_or_path, profile, pair)
     network, checkpoint = load_checkpoint(path)
     shape = profile.features
     needs = {"camera": shape.filters == checkpoint.filters, "lidar": shape.bins == checkpoint.bins}
@@ -35,7 +36,7 @@ def as_expert(name: str, network: Network, cruise: Action | None) -> Expert:
     return Expert(name, act) if cruise is None else Expert(name, act, cruise)
 
 
-def load_expert(name_or_path: str, profile: RobotProfile) -> Expert:
+def load_expert(name_or_path: str, profile: RobotProfile, pair: str = DEFAULT) -> Expert:
     """Load an expert; it is named after its sensor."""
-    network, checkpoint = load_network(name_or_path, profile)
+    network, checkpoint = load_network(name_or_path, profile, pair)
     return as_expert(checkpoint.kind, network, checkpoint.cruise)

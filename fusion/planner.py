@@ -21,14 +21,16 @@ TOUCH_M = 0.03
 
 
 class Planner:
-    """Random-free sampling planner over a fixed set of action sequences [N, T, 2]."""
+    """Random-free sampling planner over a fixed set of action sequences [N, T, 2], which steer up to `steer`."""
 
-    def __init__(self, foresight: Foresight, style: Style, period_s: float, *, follow_line: bool) -> None:
+    def __init__(
+        self, foresight: Foresight, style: Style, period_s: float, *, follow_line: bool, steer: float = 1.0
+    ) -> None:
         self._foresight = foresight
         self._period_s = period_s
         self._style = style
         self._follow = float(follow_line)
-        self._sequences = action_sequences(style, period_s)
+        self._sequences = action_sequences(style, period_s) * (1.0, steer)
         self._effort = np.abs(self._sequences[:, :, 1]).mean(axis=1)
         self._standing = (self._sequences[:, :, 0] < 0.5).mean(axis=1)
         self.reset()

@@ -25,7 +25,7 @@ Share = Annotated[float, Meta(ge=0.0, le=1.0)]
 
 
 class TeacherSettings(Table, frozen=True):
-    """The teacher's skill. The defaults are a skilled human's faults (all assumed); see `PERFECT`."""
+    """The teacher's skill. The defaults are a skilled human's faults (all assumed); see `PERFECT` and `UNSKILLED`."""
 
     style: Literal["bang-bang", "proportional"] = "bang-bang"
     horizon_s: float = 1.5
@@ -37,6 +37,7 @@ class TeacherSettings(Table, frozen=True):
     stall: Share = 0.3  # a policy that drives less than this share of full speed over the horizon stands in the way
     wander_rad: float = 0.1  # a larger turn within the horizon, without a box in the way, is wrong then
     safe_steps: int = 3
+    turn_rad_s: float = 1.1  # a hand turns a robot no faster, whatever the robot can do
     delay_s: float = 0.6  # median of the log-normal reaction delay
     called_delay_s: float = 0.35
     delay_sigma: float = 0.3
@@ -49,7 +50,8 @@ NOBODY: Mapping[str, Policy] = MappingProxyType({})
 
 SKILLED = TeacherSettings()
 PERFECT = TeacherSettings(delay_s=0.0, called_delay_s=0.0, gain_sigma=0.0, wrong_direction=0.0, missed=0.0)
-TEACHERS = {"scripted": SKILLED, "perfect": PERFECT}
+UNSKILLED = TeacherSettings(delay_s=1.0, called_delay_s=0.6, gain_sigma=0.4, wrong_direction=0.15, missed=0.1)
+TEACHERS = {"scripted": SKILLED, "perfect": PERFECT, "unskilled": UNSKILLED}
 
 
 class ScriptedTeacher:
@@ -62,7 +64,10 @@ class ScriptedTeacher:
         self._full_speed_m_s = profile.base.max_linear_m_s
         self._steps = math.ceil(settings.horizon_s / profile.period_s)
         self._preprocess = Preprocessor(profile)
-        self._planner = Planner(foresight, settings.style, profile.period_s, follow_line=settings.follow_line)
+        self._steer = min(1.0, settings.turn_rad_s / profile.base.max_angular_rad_s)
+        self._planner = Planner(
+            foresight, settings.style, profile.period_s, follow_line=settings.follow_line, steer=self._steer
+        )
         self._random = np.random.default_rng(seed)
         self._hands_off()
 
@@ -142,7 +147,7 @@ class ScriptedTeacher:
 
     def _within_reach(self, state: CourseState) -> bool:
         """Whether any steering at all could end badly. Saves looking ahead with rendered sensors where none can."""
-        turns = np.linspace(-1.0, 1.0, 9)
+        turns = np.linspace(-1.0, 1.0, 9) * self._steer
         actions = np.zeros((turns.size, self._steps, 2))
         actions[:, :, 0] = 1.0
         actions[:, :, 1] = turns[:, None]

@@ -55,6 +55,10 @@ class Reason(StrEnum):
     ESTOP = "estop"  # the emergency stop is pressed
 
 
+# A robot that stopped by itself is armed by the next zero: that has to be somebody's decision.
+HELD = frozenset({Reason.STALE, Reason.NEUTRAL_FIRST, Reason.REFUSED, Reason.ESTOP})
+
+
 @dataclass(frozen=True, slots=True)
 class Command:
     """A wish to move, in SI units.

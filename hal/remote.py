@@ -100,7 +100,8 @@ class RemoteArena:
         return bytes(self._robot.info.arena)
 
     def reset(self, episode: Episode) -> None:
-        """Start afresh. Raises `BusError` if the twin refuses or there is none."""
+        """Start afresh, and stand there until the next decision. Raises `BusError` if the twin refuses or is none."""
+        self._robot.link.stand()
         answer = self._robot.bus.ask(RESET, msgspec.json.encode(episode), timeout_s=RESET_S)
         self._robot.link.refresh(msgspec.json.decode(answer, type=float))
 

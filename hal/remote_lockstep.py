@@ -36,6 +36,9 @@ class LockstepLink:
         """Take up the observation that the robot waits with."""
         self._advance()
 
+    def stand(self) -> None:
+        """Nothing to do: between two decisions no time passes."""
+
     def refresh(self, reset_s: float) -> None:  # noqa: ARG002 - the real-time link needs it
         """Take up the first observation after a reset, whatever became of the last one."""
         self._take_newest()

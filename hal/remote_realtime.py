@@ -10,12 +10,13 @@ its own stamp and never repeated.
 import math
 import threading
 import time
+from dataclasses import replace
 
 from hal.bus import Bus, Publisher
 from hal.clock import ClockEstimate
 from hal.errors import BusError
 from hal.governor import is_neutral
-from hal.messages import STOP, Applied, Command, CourseState, Observation, Reason, Source, Twist
+from hal.messages import HELD, STOP, Applied, Command, CourseState, Observation, Reason, Source, Twist
 from hal.senses import Sense, Senses
 from hal.topics import APPLIED, CMD_VEL, SIM_STATE, TELEOP
 
@@ -42,6 +43,7 @@ class RealTimeLink:
         self._epoch = -1
         self._own_epoch = bus.epoch
         self._newest: Applied | None = None
+        self._untold = False  # the robot has stopped by itself, and whoever drives here has not heard of it
         self._held: dict[Source, Command] = {}
         self._repeat_s = 0.0
         # Over the clock, the held decisions, the order of what is sent, and what came back.
@@ -57,6 +59,14 @@ class RealTimeLink:
             if time.monotonic() > deadline_s:
                 raise BusError("the robot says nothing about its wheels", "Look whether it still runs.")
             time.sleep(POLL_S)
+
+    def stand(self) -> None:
+        """Have the robot stand until the next decision: what was decided before a reset does not drive after it."""
+        with self._heard:
+            for source, command in list(self._held.items()):
+                now_s = self._clock.now(time.monotonic())
+                self._held[source] = replace(command, twist=STOP, stamp_s=now_s)
+                self._send_held(now_s, self._held[source])
 
     def refresh(self, reset_s: float) -> None:
         """Forget what was captured before a reset, and wait a moment for what comes after it."""
@@ -87,14 +97,17 @@ class RealTimeLink:
         """Send a command and wait a moment for what the robot says it applied on it.
 
         Returns what it said last if that does not come in time, a stop if it has not said anything lately. A neutral
-        decision is not sent while the robot may have stopped by itself without a word here: it would arm the robot,
-        and nobody has decided that.
+        decision is not sent while the robot may have stopped by itself without a word here, nor once it has and the
+        caller does not know (this call tells): it would arm the robot, and nobody has decided that.
         """
         decided = command.source is Source.POLICY or command.answers >= 0
         with self._heard:
             now_s = self._clock.now(time.monotonic())
             if decided and self._would_arm_blindly(now_s, command):
-                return Applied(STOP, now_s, reason=Reason.STALE)
+                told = self._newest if self._untold else None
+                self._untold = False
+                self._held.pop(command.source, None)  # what was decided before holds no more
+                return told or Applied(STOP, now_s, reason=Reason.STALE)
             if decided:
                 self._held[command.source] = command
                 self._send_held(now_s, command)
@@ -102,8 +115,9 @@ class RealTimeLink:
                 _put(self._publishers[command.source], command, command.stamp_s)
             self._heard.wait_for(lambda: _results_from(self._newest, command, now_s), ANSWER_S)
             newest = self._newest
-        if newest is None or now_s - newest.stamp_s > APPLIED.max_age_s:
-            return Applied(STOP, now_s)
+            if newest is None or now_s - newest.stamp_s > APPLIED.max_age_s:
+                return Applied(STOP, now_s)
+            self._untold = False
         if Source.POLICY == command.source == newest.source and newest.epoch != self._own_epoch:
             return Applied(STOP, newest.stamp_s, reason=Reason.REFUSED)  # somebody else drives
         return newest
@@ -141,8 +155,16 @@ class RealTimeLink:
                     self._clock.restart()
                     self._repeat_s = 0.0
                 self._clock.note(attachment.time_s, received.arrived_s)
+                self._note_stop(received.message)
                 self._newest = received.message
                 self._heard.notify_all()
+
+    def _note_stop(self, applied: Applied) -> None:
+        """Notice when the robot stops by itself."""
+        if applied.reason not in HELD:
+            self._untold = False
+        elif self._newest is not None and self._newest.reason not in HELD:
+            self._untold = True
 
     def _repeat(self) -> None:
         with self._heard:
@@ -153,12 +175,12 @@ class RealTimeLink:
                 self._send_held(now_s, command)
 
     def _would_arm_blindly(self, now_s: float, command: Command) -> bool:
-        """Whether this is neutral, and the robot may have lost patience since it was last heard."""
+        """Whether this is neutral, and the robot has stopped, or may have lost patience since it was last heard."""
         newest = self._newest
         if newest is None or command.released or not is_neutral(command.twist):
             return False
         age_s = 0.0 if math.isnan(newest.command_age_s) else newest.command_age_s
-        return now_s - newest.stamp_s + age_s > self._patience_s
+        return self._untold or now_s - newest.stamp_s + age_s > self._patience_s
 
     def _send_held(self, now_s: float, command: Command) -> None:
         """Send a decision with the time of sending; let go of it when it is too old."""

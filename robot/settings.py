@@ -62,7 +62,7 @@ def write_base_setting(path: Path, key: str, value: float) -> None:
     Raises `ConfigError` for a file that is none, `StorageError` if it cannot be written. It is whole at any time.
     """
     load_settings(path if path.exists() else None)
-    text = set_key(path.read_text(encoding="utf-8") if path.exists() else "", "base", key, f"{value:.4f}")
+    text = set_key(path.read_text(encoding="utf-8") if path.exists() else "", "base", key, repr(round(value, 5)))
     parse_toml(text, Settings, str(path))
     new = path.with_name(path.name + ".new")
     try:

@@ -3,6 +3,7 @@
 from collections.abc import Callable
 from dataclasses import dataclass
 
+import msgspec
 import numpy as np
 
 from hal.messages import Action, Command, CourseState, Observation, Twist
@@ -51,7 +52,7 @@ class Foresight:
     ) -> None:
         self._profile = profile
         self._world = load_world(world) if isinstance(world, str) else world
-        self._twin = Twin(profile, self._world, layout=layout, renderer=renderer)
+        self._twin = Twin(sketching(profile), self._world, layout=layout, renderer=renderer)
         self.set_layout(layout)
 
     def set_layout(self, layout: int) -> None:
@@ -108,6 +109,15 @@ class Foresight:
     def close(self) -> None:
         """Let go of the second twin. May be called twice."""
         self._twin.close()
+
+
+def sketching(profile: RobotProfile) -> RobotProfile:
+    """Return the profile with a camera that draws no more than the networks see, without noise: it is only imagined."""
+    camera, px = profile.camera, profile.features.image_px
+    if camera.width_px * camera.height_px <= px * px:
+        return profile
+    sketch = msgspec.structs.replace(camera, width_px=px, height_px=px, encoding="png", noise_gray=0.0)
+    return msgspec.structs.replace(profile, camera=sketch)
 
 
 def spread(state: CourseState, count: int) -> Motion:

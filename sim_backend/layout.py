@@ -63,6 +63,21 @@ class Layout:
     blocks: tuple[Block, ...]
     marks: tuple[Mark, ...] = ()
 
+    @property
+    def paint(self) -> Floats | None:
+        """Middle of the painted line, points [n, 2]; None where there is none."""
+        line = self.world.line
+        if line is None or not line.painted:
+            return None
+        headings = self.curve.headings
+        painted: Floats = self.curve.points + line.offset_m * np.stack([-np.sin(headings), np.cos(headings)], axis=-1)
+        return painted
+
+    @property
+    def hidden_way(self) -> bool:
+        """Whether the way to go is anywhere but on a painted line."""
+        return self.paint is None or (self.world.line is not None and self.world.line.offset_m != 0.0)
+
 
 def build(world: World, layout_seed: int = 0) -> Layout:
     """Draw a layout. The same world and seed give the same boxes; every scatter draws from its own stream.
@@ -232,3 +247,11 @@ def distance_m(block: Block, x_m: float, y_m: float) -> float:
     outside_x = abs(cos * dx + sin * dy) - block.length_m / 2
     outside_y = abs(cos * dy - sin * dx) - block.width_m / 2
     return math.hypot(max(outside_x, 0.0), max(outside_y, 0.0))
+
+
+def outline(piece: Block | Mark) -> Floats:
+    """Return the four corners on the floor, metres [4, 2]."""
+    cos, sin = math.cos(piece.yaw_rad), math.sin(piece.yaw_rad)
+    along = np.array([0.5, -0.5, -0.5, 0.5]) * piece.length_m
+    across = np.array([0.5, 0.5, -0.5, -0.5]) * piece.width_m
+    return np.stack([piece.x_m + cos * along - sin * across, piece.y_m + sin * along + cos * across], axis=-1)

@@ -9,7 +9,7 @@ from fusion.lira import LiraSettings, LiraSpf
 from fusion.networks import CameraNet, FusionNet, LidarNet
 from fusion.novice import LearningSettings, Novice, Trainer
 from fusion.session import Drive
-from fusion.teacher import TEACHERS, ScriptedTeacher
+from fusion.teacher import ScriptedTeacher, TeacherSettings
 from hal.errors import ConfigError
 from hal.messages import Episode
 from hal.profile import RobotProfile
@@ -40,9 +40,9 @@ def apprentice(
     return LiraSpf(experts, novice, lira, profile.period_s)
 
 
-def teacher(name: str, profile: RobotProfile, world: World, layout: int, seed: int) -> ScriptedTeacher:
+def teacher(skill: TeacherSettings, profile: RobotProfile, world: World, layout: int, seed: int) -> ScriptedTeacher:
     """Build a scripted teacher that can look ahead in a twin of its own."""
-    return ScriptedTeacher(Foresight(profile, world, layout), profile, TEACHERS[name], seed)
+    return ScriptedTeacher(Foresight(profile, world, layout), profile, skill, seed)
 
 
 def lap(profile: RobotProfile, world: World, layout: int) -> Drive:

@@ -2,13 +2,14 @@
 
 import math
 import time
+import warnings
 from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 
 from hal.errors import LiraError
-from hal.messages import STOP, Applied, Command, LaserScan, Observation, Reason, Twist
+from hal.messages import STOP, Applied, Command, LaserScan, Observation, Odometry, Reason, Twist
 from hal.port import Robot
 from robot.calibration import free_ahead_m, free_around_m
 
@@ -87,7 +88,10 @@ class Manoeuvre:
         if len(scans) < 3:
             raise CalibrationError("the lidar shows nothing", "Look at its cable, or calibrate --by tape.")
         newest = scans[-1]
-        ranges = np.median(np.stack([scan.ranges for scan in scans if len(scan.ranges) == len(newest.ranges)]), axis=0)
+        beams = np.stack([scan.ranges for scan in scans if len(scan.ranges) == len(newest.ranges)])
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", RuntimeWarning)  # a beam that never sees anything stays nan
+            ranges = np.nanmedian(beams, axis=0)
         return LaserScan(
             newest.stamp_s,
             newest.angle_min,
@@ -97,17 +101,18 @@ class Manoeuvre:
             ranges.astype(np.float32),
         )
 
-    def ahead(self, distance_m: float) -> float:
+    def ahead(self, distance_m: float) -> "Way":
         """Drive straight on until the odometry says so many metres; returns what it says at rest."""
-        return self._go(Twist(self._linear_m_s, 0.0), distance_m, self._linear_m_s)
+        return self._go(Twist(self._linear_m_s, 0.0), distance_m)
 
-    def turn(self, angle_rad: float) -> float:
+    def turn(self, angle_rad: float) -> "Way":
         """Turn left on the spot until the odometry says so many radians; returns what it says at rest."""
-        return self._go(Twist(0.0, self._angular_rad_s), angle_rad, self._angular_rad_s)
+        return self._go(Twist(0.0, self._angular_rad_s), angle_rad)
 
-    def _go(self, twist: Twist, target: float, speed: float) -> float:
+    def _go(self, twist: Twist, target: float) -> "Way":
         self._arm()
-        way = _Way(turns=twist.angular_rad_s != 0.0)
+        way = Way(turns=twist.angular_rad_s != 0.0)
+        speed = max(twist.linear_m_s, twist.angular_rad_s)
         began_s = time.monotonic()
         try:
             while way.done < target:
@@ -124,9 +129,9 @@ class Manoeuvre:
         until_s = time.monotonic() + SETTLE_S
         while time.monotonic() < until_s:
             way.see(self._step(STOP)[0])
-        return way.done
+        return way
 
-    def _watch(self, seen: Observation, applied: Applied, way: "_Way") -> None:
+    def _watch(self, seen: Observation, applied: Applied, way: "Way") -> None:
         if "field_blind" in applied.clamps:
             what = "the robot stopped: its protective field does not see the way"
             raise CalibrationError(what, "Give --lidar, also with --by tape; or look at its cable.")
@@ -159,24 +164,28 @@ class Manoeuvre:
         return seen, applied
 
 
-class _Way:
-    """How far the odometry says that it went: metres ahead, or radians to the left."""
+class Way:
+    """What the odometry says of a way: metres ahead and radians to the left; `done` is that of the two which counts."""
 
     def __init__(self, *, turns: bool) -> None:
         self._turns = turns
-        self._before: tuple[float, float, float] | None = None
-        self.done = 0.0
+        self._before: Odometry | None = None
+        self.ahead_m = self.turn_rad = 0.0
+
+    @property
+    def done(self) -> float:
+        """Radians of a turn, metres of a drive."""
+        return self.turn_rad if self._turns else self.ahead_m
 
     def see(self, seen: Observation) -> None:
-        odom = seen.odom
+        """Go on from where it was seen last."""
+        before, odom = self._before, seen.odom
         if odom is None:
             return
-        pose = (odom.x_m, odom.y_m, odom.yaw_rad)
-        if self._before is not None:
-            turn_rad = math.remainder(pose[2] - self._before[2], math.tau)
-            heading_rad = self._before[2] + turn_rad / 2
-            ahead_m = (pose[0] - self._before[0]) * math.cos(heading_rad) + (pose[1] - self._before[1]) * math.sin(
-                heading_rad
-            )
-            self.done += turn_rad if self._turns else ahead_m
-        self._before = pose
+        if before is not None:
+            turn_rad = math.remainder(odom.yaw_rad - before.yaw_rad, math.tau)
+            heading_rad = before.yaw_rad + turn_rad / 2
+            east_m, north_m = odom.x_m - before.x_m, odom.y_m - before.y_m
+            self.ahead_m += east_m * math.cos(heading_rad) + north_m * math.sin(heading_rad)
+            self.turn_rad += turn_rad
+        self._before = odom

@@ -3,10 +3,13 @@
 Change `faults` at any time, from any thread. While `dark`, datagrams are lost, and streams held and delivered late, as
 TCP does; `delay_s` holds everything back, `copies` sends every datagram more than once, `swap` exchanges neighbours;
 `no_datagrams` loses all of them and no stream.
+
+python -m tools.relay PORT TARGET_PORT     the same as a process of its own, which can be killed
 """
 
 import asyncio
 import contextlib
+import sys
 import threading
 from collections.abc import Callable, Coroutine
 from dataclasses import dataclass
@@ -15,6 +18,7 @@ from typing import Any, cast
 CHUNK = 65536
 LOOK_S = 0.01
 READY_S = 5.0
+READY = "passes on"
 
 
 @dataclass(slots=True)
@@ -180,3 +184,14 @@ class _Sender:
                 for _ in range(faults.copies):
                     asyncio.get_running_loop().call_later(faults.delay_s, self._put, one)
         self._held = None
+
+
+def main(port: int, target_port: int) -> None:
+    """Pass on until killed."""
+    with Relay(port, target_port):
+        print(READY, flush=True)
+        threading.Event().wait()
+
+
+if __name__ == "__main__":
+    main(int(sys.argv[1]), int(sys.argv[2]))

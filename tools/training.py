@@ -4,12 +4,13 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Literal
 
+import msgspec
 import numpy as np
 import torch
 
 from fusion.checkpoint import Checkpoint, save_checkpoint
 from fusion.control import ControlLoop
-from fusion.curriculum import CURRICULA
+from fusion.curriculum import Curriculum, curriculum
 from fusion.hg_dagger import HgDagger
 from fusion.journal import Journal
 from fusion.learner import Learner
@@ -28,14 +29,18 @@ from sim_backend.foresight import Foresight
 from sim_backend.twin import Twin
 from tools.progress import Progress
 
-CRUISE_STEPS = 25
+BLIND_PX = 4
 
 
-def train_expert(kind: Literal["camera", "lidar"], profile: RobotProfile, seed: int, path: Path, command: str) -> bool:
-    """Train the camera or lidar expert and save it to `path` if it passes. Returns whether it did."""
+def train_expert(
+    kind: Literal["camera", "lidar"], task: str, profile: RobotProfile, seed: int, path: Path, command: str
+) -> bool:
+    """Train a task's camera or lidar expert and save it to `path` if it passes. Returns whether it did."""
     torch.set_num_threads(1)
-    curriculum = CURRICULA[kind]
-    world = load_world(curriculum.world)
+    course = curriculum(kind, task)
+    world = load_world(course.world)
+    if kind == "lidar":
+        profile = blindfolded(profile)
     shape = profile.features
     network: Network
     network = CameraNet(shape.filters, seed=seed) if kind == "camera" else LidarNet(shape.bins, seed=seed)
@@ -52,29 +57,35 @@ def train_expert(kind: Literal["camera", "lidar"], profile: RobotProfile, seed: 
     robot.open()
     try:
         loop = ControlLoop(robot, truth=twin.state)
-        teacher = ScriptedTeacher(Foresight(profile, world), profile, curriculum.teacher, seed)
+        teacher = ScriptedTeacher(Foresight(profile, world), profile, course.teacher, seed)
         session = Session(robot, twin, loop, Journal(write=show), HgDagger(novice))
         loop.arm()
-        passed = session.teach(curriculum.drives, teacher, curriculum.laps)
+        passed = session.teach(course.drives, teacher, course.laps)
     finally:
         robot.close()
     if passed:
-        cruise = measure_cruise(network, profile)
+        cruise = measure_cruise(network, profile, course)
         about = Checkpoint(kind, shape.bins, shape.filters, profile.name, cruise, command, seed)
         save_checkpoint(path, network, replace(about, labels=novice.stored, training_steps=novice.training_steps))
         print(f"{kind} expert: {novice.stored} labels, {novice.training_steps} training steps, saved to {path}")
     return passed
 
 
-def measure_cruise(network: Network, profile: RobotProfile) -> Action:
-    """Median action on an empty straight course: what the expert does while its sensor shows nothing to react to."""
-    robot = GovernedRobot(Twin(profile, load_world("straight")))
+def blindfolded(profile: RobotProfile) -> RobotProfile:
+    """Return the profile with a tiny picture: whoever sees with the lidar alone need not wait for a camera."""
+    camera = msgspec.structs.replace(profile.camera, width_px=BLIND_PX, height_px=BLIND_PX, encoding="png")
+    return msgspec.structs.replace(profile, camera=camera)
+
+
+def measure_cruise(network: Network, profile: RobotProfile, course: Curriculum) -> Action:
+    """Median action where the world is straight and empty: what the expert does with nothing to react to."""
+    robot = GovernedRobot(Twin(profile, load_world(course.cruise_world)))
     robot.open()
     try:
         loop = ControlLoop(robot)
         loop.arm()
         alone = Alone("novice", lambda features: network.act(features.scan, features.image))
-        steps = [loop.step(alone) for _ in range(CRUISE_STEPS)]
+        steps = [loop.step(alone) for _ in range(course.cruise_steps)]
     finally:
         robot.close()
     actions = [step.proposal.choice.action for step in steps if step is not None]

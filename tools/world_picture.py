@@ -10,7 +10,7 @@ from hal.messages import ByteArray
 from hal.profile import RobotProfile
 from sim_backend.camera import PinholeCamera
 from sim_backend.course import Course, footprint_radius_m
-from sim_backend.layout import Block, Layout, Mark
+from sim_backend.layout import Block, Layout, Mark, outline
 from sim_backend.polyline import Floats
 from sim_backend.scene import Scene
 
@@ -63,12 +63,11 @@ def from_above(layout: Layout, poses: list[Pose]) -> ByteArray:
     sheet = Sheet(layout)
     for mark in layout.marks:
         sheet.fill(outline(mark), mark.gray)
-    line, curve = layout.world.line, layout.curve
-    if line is not None and line.painted:
-        left = np.stack([-np.sin(curve.headings), np.cos(curve.headings)], axis=-1)
-        sheet.paint(curve.points + line.offset_m * left, line.gray, line.width_m)
-    if line is None or not line.painted or line.offset_m:
-        sheet.dash(curve.points)
+    line, paint = layout.world.line, layout.paint
+    if line is not None and paint is not None:
+        sheet.paint(paint, line.gray, line.width_m)
+    if layout.hidden_way:
+        sheet.dash(layout.curve.points)
     for block in layout.blocks:
         if not block.bottom_m:
             sheet.fill(outline(block), block.gray)
@@ -141,11 +140,3 @@ class Sheet:
     def _pixels(self, points: Floats) -> NDArray[np.int32]:
         pixels: NDArray[np.int32] = np.rint((points - self._corner) * (self._px_m, -self._px_m)).astype(np.int32)
         return pixels
-
-
-def outline(piece: Block | Mark) -> Floats:
-    """Return the four corners on the floor, metres [4, 2]."""
-    cos, sin = math.cos(piece.yaw_rad), math.sin(piece.yaw_rad)
-    along = np.array([0.5, -0.5, -0.5, 0.5]) * piece.length_m
-    across = np.array([0.5, 0.5, -0.5, -0.5]) * piece.width_m
-    return np.stack([piece.x_m + cos * along - sin * across, piece.y_m + sin * along + cos * across], axis=-1)

@@ -60,6 +60,7 @@ class Ros2Robot:
 
     def __init__(self, profile: RobotProfile, bus: Bus, interface: Interface) -> None:
         self._profile = profile
+        self._bus = bus
         self._interface = interface
         self._readers: dict[str, Reader[Any]] = {name: bus.reader(interface.topic(name)) for name in SENSED}
         self._wheels: Publisher[Any] = bus.publisher(interface.topic(COMMANDED))
@@ -77,11 +78,14 @@ class Ros2Robot:
         return self._profile
 
     def open(self) -> None:
-        """Wait until the robot shows what it must. Raises `DeviceError` that names what it does not."""
+        """Wait until the robot shows what it must. Raises `DeviceError` that names what it does not, `BusError`."""
         until_s = time.monotonic() + OPEN_S
         while (lost := self._silent()) and time.monotonic() < until_s:
             self._listen()
             time.sleep(LOOK_S)
+        if lost and self._bus.peers() == 0:
+            what = f"no bridge answers at {self._bus.endpoint}"
+            raise BusError(what, "Does zenoh-bridge-ros2dds run there, and is the address right?")
         for name in lost:
             key = self._interface.topic(name).key
             stamp = getattr(self._newest.get(name), "stamp_s", None)

@@ -228,3 +228,26 @@ def test_a_sensor_that_stays_silent_ends_the_session_and_is_named():
     session, _ = school(track)
     with pytest.raises(DeviceError, match=f"{LOST_OBSERVATIONS} observations in a row.*nothing new from the lidar"):
         session.show([Drive(Episode(), NEVER_S)])
+
+
+class Stalling(Track):
+    """A busy machine: nothing happens for a second, once, and the robot stops by itself."""
+
+    def __init__(self):
+        super().__init__(finish_m=6.0)
+        self.reads = 0
+
+    def read(self):
+        self.reads += 1
+        if self.reads == 8:
+            self.wait(self.now() + 1.0)
+        return super().read()
+
+
+def test_a_robot_that_stopped_by_itself_is_armed_and_driven_on():
+    track = Stalling()
+    session, _ = school(track)
+    (lap,) = session.show([Drive(Episode(), NEVER_S)])
+    assert lap.passed
+    # The second that nothing happened, one step to hear of it and one to arm it.
+    assert lap.duration_s < 6.0 / PROFILE.base.max_linear_m_s + 2.0

@@ -14,10 +14,10 @@ from hal.bus import Bus
 from hal.codec import encode
 from hal.errors import BusError, DeviceError
 from hal.governed import GovernedRobot
-from hal.messages import STOP, Command, DepthImage, Reason, Source, Twist
+from hal.messages import STOP, Command, DepthImage, Episode, Reason, Source, Twist
 from hal.null import NullRobot
 from hal.profile import STOP_BUDGET_S
-from hal.remote import RemoteRobot
+from hal.remote import RemoteArena, RemoteRobot
 from hal.remote_realtime import DECISION_S
 from hal.server import HalServer
 from hal.topics import APPLIED, CMD_VEL, DEPTH
@@ -46,6 +46,28 @@ def test_a_decision_is_kept_alive_and_a_hung_loop_is_not():
         wait_for(lambda: is_still(robot))
         assert robot.inner.now() - decided_s < DECISION_S + STOP_BUDGET_S + 0.2
         wait_for(lambda: client.drive(Command(GO, client.now())).reason is Reason.NEUTRAL_FIRST)
+
+
+def test_who_has_not_heard_that_the_robot_stopped_does_not_arm_it_with_a_zero():
+    with served(real_time_null()) as robot, remote(robot) as client:
+        get_going(client)
+        wait_for(lambda: client.link._newest.reason is Reason.STALE)
+        told = client.drive(Command(STOP, client.now(), answers=1))
+        assert told.reason is Reason.STALE
+        time.sleep(0.2)
+        assert robot.governed.state == "stopped"
+        wait_for(lambda: client.drive(Command(STOP, client.now(), answers=1)).reason is Reason.OK)
+        assert robot.governed.state == "armed"
+
+
+def test_what_was_decided_before_a_reset_does_not_drive_after_it():
+    with served(real_time_null()) as robot, remote(robot) as client:
+        get_going(client)
+        RemoteArena(client).reset(Episode())
+        put_down_m = robot.inner.state().x_m
+        time.sleep(DECISION_S)
+        assert robot.inner.state().x_m == put_down_m
+        get_going(client)
 
 
 def test_a_hand_is_not_kept_alive():

@@ -3,6 +3,7 @@
 import contextlib
 import math
 import re
+import signal
 import threading
 import time
 from contextlib import contextmanager
@@ -14,11 +15,13 @@ from hal.errors import ConfigError
 from hal.messages import STOP, LaserScan, Odometry
 from robot.calibration import turn_between, wall_ahead_m
 from robot.line import Line
-from robot.settings import load_settings, set_key, write_base_setting
+from robot.settings import BaseSettings, load_settings, set_key, write_base_setting
 from sim_backend.emulators.core2 import Core2Unit, Firmware
 from sim_backend.emulators.rplidar import RplidarUnit
 from sim_backend.emulators.wire import Wire
-from tools.cli import main
+from tools.calibration import CalibrationError, Way
+from tools.cli import EXIT_INTERRUPTED, main
+from tools.processes import ChildProcess, lira_command
 from tools.verbs import calibrate
 
 WALLS_M = (3.0, 1.7, -1.0, -1.3)  # ahead, left, behind, right of where it starts
@@ -36,10 +39,13 @@ def to_walls(x_m, y_m, bearing):
 
 
 class Room:
-    """A robot in a room: it really goes `far` times as far, and turns `much` times as much, as its board reports."""
+    """A robot in a room: it really goes `far` times as far, and turns `much` times as much, as its board reports.
 
-    def __init__(self, far=1.0, much=1.0):
-        self._far, self._much = far, much
+    The board also reports `slip` metres ahead for each radian of a turn.
+    """
+
+    def __init__(self, far=1.0, much=1.0, slip=0.0):
+        self._far, self._much, self._slip = far, much, slip
         self._lock = threading.Lock()
         self._twist, self._since_s = STOP, time.monotonic()
         self.true = self._told = (0.0, 0.0, 0.0)
@@ -72,7 +78,8 @@ class Room:
             return
         ahead_m, turn_rad = self._twist.linear_m_s * dt_s, self._twist.angular_rad_s * dt_s
         self.true = moved(self.true, ahead_m, turn_rad)
-        self._told = moved(self._told, ahead_m / self._far, turn_rad / self._much)
+        told_rad = turn_rad / self._much
+        self._told = moved(self._told, ahead_m / self._far + self._slip * told_rad, told_rad)
 
 
 def moved(pose, ahead_m, turn_rad):
@@ -83,33 +90,44 @@ def moved(pose, ahead_m, turn_rad):
 
 @contextmanager
 def devices(folder, room):
-    board = Core2Unit(room.drive, room.measure, Firmware(boot_s=0.05))
-    wires = [Wire(folder / "core2", board), Wire(folder / "rplidar", RplidarUnit(room.distances))]
+    lidar = RplidarUnit(room.distances)
+    wires = [Wire(folder / "core2", Core2Unit(room.drive, room.measure, Firmware(boot_s=0.05)))]
+    wires.append(Wire(folder / "rplidar", lidar))
     settings = folder / "mine.toml"
     settings.write_text(QUICK)
     try:
         words = ["calibrate", "base", "--base", str(folder / "core2"), "--settings", str(settings)]
-        yield words, ["--lidar", str(folder / "rplidar"), "--yes"], wires
+        yield words, ["--lidar", str(folder / "rplidar"), "--yes"], wires[1], lidar
     finally:
         for wire in wires:
             wire.close()
 
 
+def calibrated(words, room, capsys):
+    """Calibrate; returns what it says. On a busy machine a scan may come late: then it stops, and is begun again."""
+    for _ in range(4):
+        room.put_back()
+        if main(words) == 0:
+            return capsys.readouterr().out
+        error = capsys.readouterr().err
+        assert "the robot stopped" in error
+    raise AssertionError(error)
+
+
 def test_with_a_lidar_a_ten_percent_error_is_found_by_itself_and_written(tmp_path, capsys):
-    room = Room(far=1.1, much=1.15)
-    with devices(tmp_path, room) as (words, lidar, _):
+    room = Room(far=1.1, much=1.15, slip=-0.0114)
+    with devices(tmp_path, room) as (words, lidar, *_):
         words = [*words, *lidar, "--distance", "0.5"]  # noqa: PLW2901
-        assert main([*words, "--turns", "0.75"]) == 0, capsys.readouterr().err
-        out = capsys.readouterr().out
+        out = calibrated([*words, "--turns", "0.75"], room, capsys)
         settings = load_settings(tmp_path / "mine.toml")
         assert settings.base.distance_scale == pytest.approx(1.1, abs=0.02), out
         assert settings.base.turn_scale == pytest.approx(1.15, abs=0.015), out
-        assert "distance_scale 1.0000 -> 1." in out
+        assert settings.base.spin_slip_m_rad == pytest.approx(-0.0114, abs=0.001), out
+        assert "written to" in out
         assert "# it turns" in (tmp_path / "mine.toml").read_text()
         assert room.twists[-1] == STOP
         # With what it has learnt it goes as far as it is told.
-        room.put_back()
-        assert main([*words, "--only", "distance"]) == 0, capsys.readouterr().err
+        calibrated([*words, "--only", "distance"], room, capsys)
         assert math.hypot(*room.true[:2]) == pytest.approx(0.5, abs=0.05)
         assert load_settings(tmp_path / "mine.toml").base.distance_scale == pytest.approx(1.1, abs=0.02)
 
@@ -119,7 +137,7 @@ def test_with_a_tape_the_person_says_what_was_measured(tmp_path, capsys, monkeyp
     asked = []
     monkeypatch.setattr("sys.stdin.isatty", lambda: True, raising=False)
     monkeypatch.setattr("builtins.input", lambda question: asked.append(question) or next(answers))
-    with devices(tmp_path, Room(far=1.1)) as (words, _, _):
+    with devices(tmp_path, Room(far=1.1)) as (words, *_):
         words = [*words, *NO_FIELD, "--only", "distance", "--distance", "0.3"]  # noqa: PLW2901
         assert main(words) == 0, capsys.readouterr().err
     assert "power switch" in asked[0]
@@ -134,7 +152,7 @@ def refused(words, capsys):
 
 def test_it_refuses_what_is_not_safe_and_writes_nothing(tmp_path, capsys, monkeypatch):
     room = Room()
-    with devices(tmp_path, room) as (words, lidar, _):
+    with devices(tmp_path, room) as (words, lidar, *_):
         assert "nobody is there to ask" in refused([*words, *lidar[:2]], capsys)
         assert "no --lidar" in refused([*words, "--by", "lidar"], capsys)
         assert "--distance is" in refused([*words, "--distance", "90", "--yes"], capsys)
@@ -154,23 +172,26 @@ def test_whoever_says_no_moves_nothing(tmp_path, capsys, monkeypatch):
     monkeypatch.setattr("sys.stdin.isatty", lambda: True, raising=False)
     monkeypatch.setattr("builtins.input", lambda _: "")
     room = Room()
-    with devices(tmp_path, room) as (words, _, _):
+    with devices(tmp_path, room) as (words, *_):
         assert "Nothing was moved" in refused([*words, *NO_FIELD], capsys)
     assert set(room.twists) <= {STOP}
 
 
 def test_a_lidar_that_goes_mid_drive_ends_it(tmp_path, capsys):
     room = Room()
-    with devices(tmp_path, room) as (words, lidar, wires):
+    with devices(tmp_path, room) as (words, lidar, wire, _):
 
         def unplug_on_the_way():
             while room.true[0] < 0.05:
                 time.sleep(0.01)
-            wires[1].unplug()
+            wire.unplug()
 
         vandal = threading.Thread(target=unplug_on_the_way, daemon=True)
         vandal.start()
-        error = refused([*words, *lidar, "--only", "distance"], capsys)
+        for _ in range(4):  # on a busy machine it may stop before
+            error = refused([*words, *lidar, "--only", "distance"], capsys)
+            if room.true[0] > 0.05:
+                break
         vandal.join(1.0)
     assert "the robot stopped" in error
     assert 0.05 < room.true[0] < 0.3
@@ -178,12 +199,40 @@ def test_a_lidar_that_goes_mid_drive_ends_it(tmp_path, capsys):
     assert (tmp_path / "mine.toml").read_text() == QUICK
 
 
-def test_what_cannot_be_true_is_not_written():
-    from tools.calibration import CalibrationError
+@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGHUP])
+def test_a_kill_and_a_lost_terminal_end_it_with_wheels_and_lidar_still(tmp_path, number):
+    room = Room()
+    with devices(tmp_path, room) as (words, lidar, _, unit):
+        command = lira_command(*words, *lidar, "--only", "distance")
+        with ChildProcess("the calibration", command, tmp_path / "calibrate.log") as child:
+            until_s = time.monotonic() + 20.0
+            while room.true[0] < 0.05:
+                assert time.monotonic() < until_s, child.output()
+                time.sleep(0.01)
+            child.signal(number)
+            assert child.wait(10.0) == EXIT_INTERRUPTED
+        assert room.twists[-1] == STOP
+        assert room.true[0] < 0.3
+        time.sleep(0.05)
+        assert unit.pwm == 0
+    assert (tmp_path / "mine.toml").read_text() == QUICK
 
-    with pytest.raises(CalibrationError, match="cannot be right"):
-        calibrate.checked("distance", 1.9)
-    assert calibrate.checked("distance", 1.1) == 1.1
+
+def way_of(*, turns, ahead_m, turn_rad):
+    way = Way(turns=turns)
+    way.ahead_m, way.turn_rad = ahead_m, turn_rad
+    return way
+
+
+def test_what_is_found_builds_on_what_was_set_and_what_cannot_be_true_is_not_written():
+    before = BaseSettings(distance_scale=1.2, turn_scale=1.1, spin_slip_m_rad=-0.01)
+    found = calibrate.found("distance", before, 1.1, way_of(turns=False, ahead_m=1.0, turn_rad=0.0))
+    assert found == {"distance_scale": pytest.approx(1.32)}
+    found = calibrate.found("turn", before, 11.0, way_of(turns=True, ahead_m=0.012, turn_rad=11.0))
+    assert found == {"turn_scale": pytest.approx(1.1), "spin_slip_m_rad": pytest.approx(-0.01 + 0.01 / 10.0)}
+    for name, true, ahead_m in (("distance", 1.9, 1.0), ("turn", 1.0, 0.2)):
+        with pytest.raises(CalibrationError, match="cannot be right"):
+            calibrate.found(name, BaseSettings(), true, way_of(turns=name == "turn", ahead_m=ahead_m, turn_rad=1.0))
 
 
 def scan_at(x_m, y_m, yaw_rad, beams=400, noise_m=0.005):

@@ -13,7 +13,7 @@ from mcap_ros2.decoder import DecoderFactory
 from ros2_peer import ATTACHMENTS, Peer, twist_cdr
 
 from hal.bus import Bus
-from hal.errors import ConfigError, DeviceError
+from hal.errors import BusError, ConfigError, DeviceError
 from hal.governed import GovernedRobot
 from hal.messages import STOP, Command, CompressedImage, LaserScan, Reason, Twist
 from hal.profile import load_profile
@@ -158,6 +158,14 @@ def test_a_robot_that_does_not_show_what_is_needed_is_refused_with_the_topic(mon
     finally:
         bus.close()
         robot.close()
+
+
+def test_where_no_bridge_is_that_is_said(monkeypatch):
+    monkeypatch.setattr("robot.ros2.robot.OPEN_S", 0.3)
+    bus = Bus("lonely", connect=f"127.0.0.1:{free_port()}", prefix="")
+    with pytest.raises(BusError, match="no bridge answers"):
+        Ros2Robot(PROFILE, bus, Interface()).open()
+    assert bus.close()
 
 
 @pytest.mark.parametrize("datagrams", [False, True])

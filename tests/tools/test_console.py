@@ -280,8 +280,9 @@ def test_the_keys_ask_and_say_that_nobody_answers(tmp_path):
         stack.callback(watch.close)
         bus.ask(INFO)
         asked, answers = watch.reader(OPERATOR, depth=16), bus.publisher(OPERATOR_ANSWER)
-        ears, keyboard = Ears(watch, load_profile("thesis-sim")), Keyboard(Wheel(bus, watch, 10.0))
-        heard = []
+        wheel, heard = Wheel(bus, watch, 10.0), []
+        ears, keyboard = Ears(watch, load_profile("thesis-sim")), Keyboard(wheel)
+        listened = bus.publisher(OPERATOR)
 
         def press(keys, condition):
             deadline_s = time.monotonic() + 10.0
@@ -294,7 +295,7 @@ def test_the_keys_ask_and_say_that_nobody_answers(tmp_path):
         def view():
             return replace(ears.look(), unanswered=keyboard.unanswered)
 
-        press("", lambda: keyboard.state == "ready")
+        press("", lambda: keyboard.state == "ready" and wheel.known and listened.matching)
         press("p", lambda: heard == [OperatorRequest(Request.PAUSE)])
         press("", lambda: keyboard.unanswered is Request.PAUSE)
         assert operator_words(view()) == ("nobody answers to 'pause': does lira fusion run?", False)

@@ -1,45 +1,21 @@
 """Experiments: statistics against numbers worked out by hand, and real trials on a short world."""
 
-import msgspec
 import numpy as np
 import pytest
+from short_trials import short_trial, timeless, write_world
 
-from fusion.lira import PRESETS
 from hal.errors import StorageError
 from tools.cli import main
 from tools.experiments.compare import ratios, summary
+from tools.experiments.kept import kept
+from tools.experiments.pools import Here
 from tools.experiments.runner import run_trials
 from tools.experiments.statistics import bootstrap, iqm, median_interval, paired_ratios
-from tools.experiments.trial import Method, Trial, run_trial
-
-SHORT = """
-description = "Ten metres of line with one box on it"
-[line]
-pieces = [{ straight_m = 16.0 }]
-[[box]]
-x_m = 8.0
-y_m = 0.1
-[limits]
-finish_m = 12.0
-lost_m = 1.5
-"""
 
 
 @pytest.fixture
 def world(tmp_path):
-    path = tmp_path / "short.toml"
-    path.write_text(SHORT)
-    return str(path)
-
-
-def short_trial(world, *, seed=0, name="lira-hold", lira=PRESETS["hold"]):
-    return Trial(Method(name, lira), world, seed, teacher="perfect", laps=1, unseen=1)
-
-
-def timeless(outcome):
-    """An outcome without what the wall clock adds."""
-    laps = [msgspec.structs.replace(lap, elapsed_s=0.0) for lap in outcome.laps]
-    return outcome.trial, laps, msgspec.structs.replace(outcome.result, elapsed_s=0.0)
+    return write_world(tmp_path)
 
 
 def test_interquartile_mean_leaves_out_both_ends():
@@ -72,11 +48,11 @@ def test_trials_do_not_depend_on_the_number_of_workers_and_resume(world, tmp_pat
         short_trial(world),
         short_trial(world, name="hg-dagger", lira=None),
     ]
-    alone = run_trials(trials, tmp_path / "alone", workers=1)
-    together = run_trials(trials, tmp_path / "together", workers=2)
+    alone = run_trials(trials, tmp_path / "alone", Here(1))
+    together = run_trials(trials, tmp_path / "together", Here(2))
     assert [timeless(each) for each in alone] == [timeless(each) for each in together]
     assert alone[0].result.buffer > 0
-    again = run_trials(trials, tmp_path / "alone", workers=1)
+    again = run_trials(trials, tmp_path / "alone", Here(1))
     assert again == alone  # to the wall-clock time: read, not run
 
     rows = summary(alone)
@@ -91,7 +67,7 @@ def test_an_outcome_that_is_damaged_is_named(world, tmp_path):
     trial = short_trial(world)
     (tmp_path / trial.file).write_text("{")
     with pytest.raises(StorageError, match="Delete it"):
-        run_trial(trial, tmp_path)
+        kept(trial, tmp_path)
 
 
 def test_the_command_refuses_what_makes_no_sense(capsys):

@@ -4,10 +4,12 @@ import random
 
 import pytest
 
+from hal.messages import Source
 from hal.ros import CODECS
 from tools.bench import BENCHES, fuzz
-from tools.bench.soak import growth
+from tools.bench.soak import Watched, Work, growth, rise
 from tools.cli import main
+from tools.verbs.bench import exit_status
 
 
 def test_garbage_ends_in_a_value_or_in_the_decoders_own_error():
@@ -29,6 +31,39 @@ def test_another_error_is_told_with_the_input():
 def test_growth_is_that_of_the_median():
     assert growth([5, 5, 5, 9, 5, 5, 5, 5, 5]) == 0
     assert growth([1, 1, 1, 2, 2, 2, 3, 3, 3]) == 2
+
+
+def test_a_leak_is_told_from_noise_peaks_and_a_late_first_use():
+    noise = random.Random(1)
+    flat = [50_000 + noise.randint(-300, 300) + (9000 if step % 97 == 0 else 0) for step in range(1800)]
+    assert abs(rise(flat)) < 200
+    assert rise([kb + 5 * step for step, kb in enumerate(flat)]) == pytest.approx(5 * 1800, rel=0.05)
+    assert rise([7]) == 0.0
+
+
+def test_a_row_fails_for_a_leak_of_memory_threads_or_files():
+    for rss, threads, files, flat in (
+        (0, 0, 0, True),
+        (60, 0, 0, False),
+        (0, 1, 0, False),
+        (0, 0, 1, False),
+    ):
+        steps = range(100)
+        watched = Watched("x", None, *([9 + step * more for step in steps] for more in (rss, threads, files)))
+        assert watched.row()["flat"] is flat
+    assert exit_status([watched.row()]) == 1
+    assert exit_status([{"inputs": 1}]) == 0
+
+
+def test_a_soak_in_which_nobody_drives_fails():
+    work = Work()
+    for source in (Source.NONE, Source.POLICY, Source.TELEOP):
+        work.note(source, moving=source is Source.POLICY)
+    assert not work.row()["flat"]
+    for source in (Source.POLICY, Source.TELEOP):
+        work.note(source, moving=True)
+        work.note(Source.POLICY, moving=True)
+    assert work.row()["flat"]
 
 
 def test_both_are_benches_and_minutes_are_the_soaks_alone(capsys):

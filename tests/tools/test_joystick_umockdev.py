@@ -74,6 +74,7 @@ class Rig:
     def __init__(self, bed, bus, process):
         self.bed, self.process = bed, process
         self.applied, self.teleop, self.joy = Watcher(bus, APPLIED), Watcher(bus, TELEOP), Watcher(bus, JOY)
+        self.asked = Watcher(bus, OPERATOR)
 
     def says(self, words, times=1):
         output = self.process.output
@@ -277,13 +278,12 @@ def test_what_was_learned_about_the_pad_outlives_the_bridge(rig, bed, start, tmp
     start().says("ready: hold the dead-man")
 
 
-def test_buttons_ask_while_the_hand_is_off_and_say_that_nobody_answers(rig, bus):
-    asked = Watcher(bus, OPERATOR)
+def test_buttons_ask_while_the_hand_is_off_and_say_that_nobody_answers(rig):
     for button, request in (("BTN_WEST", Request.PAUSE), ("BTN_NORTH", Request.SAVE), ("BTN_EAST", Request.RESET)):
         rig.bed.key(PAD, button, 1)
-        wait_for(lambda request=request: asked.last() == OperatorRequest(request), rig.process.output)
+        wait_for(lambda request=request: rig.asked.last() == OperatorRequest(request), rig.process.output)
         rig.bed.key(PAD, button, 0)
-    assert len(asked.all()) == 3
+    assert len(rig.asked.all()) == 3
     rig.says("nobody answers to 'reset': does lira fusion run?")
     assert rig.applied.last().source is Source.NONE
 

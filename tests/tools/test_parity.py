@@ -2,8 +2,10 @@
 
 import json
 import math
+import signal
 import threading
 import uuid
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from dataclasses import replace
 
@@ -22,13 +24,21 @@ from tools import cli
 from tools.parity import motion
 from tools.parity.compare import DIFFERS, MISSING, SAME, compare
 from tools.parity.page import render
-from tools.parity.record import Heard, Recording, Span, record
+from tools.parity.record import Heard, InterruptedScriptError, Recording, Span, record
 from tools.parity.script import motions
 from tools.parity.sight import match_scans
 from tools.processes import free_port
+from tools.verbs import parity
 
 PROFILE = load_profile("rosbot2")
 WALLS = (3.0, -1.5, 2.0, -1.2)  # of a room, seen from the robot: ahead, behind, left, right
+
+
+@pytest.fixture(autouse=True)
+def _keep_signals():
+    before = signal.getsignal(signal.SIGTERM)
+    yield
+    signal.signal(signal.SIGTERM, before)
 
 
 def room(bearing):
@@ -199,18 +209,18 @@ def on_the_bus(**faults):
         assert robot_bus.close()
 
 
+def script_on_both():
+    """Recordings of a good twin and a bad one, driven at the same time."""
+    with on_the_bus() as good, on_the_bus(scale=1.2, mirrored=True) as bad, ThreadPoolExecutor() as pool:
+        drives = [pool.submit(record, bus, name) for name, bus in (("good", good), ("bad", bad))]
+        return {drive.result().name: drive.result() for drive in drives}
+
+
 def test_two_twins_over_the_bus_and_one_of_them_is_wrong():
-    with on_the_bus() as good, on_the_bus(scale=1.2, mirrored=True) as bad:
-        found = {}
-
-        def drive(name, bus):
-            found[name] = record(bus, name)
-
-        threads = [threading.Thread(target=drive, args=each) for each in (("good", good), ("bad", bad))]
-        for thread in threads:
-            thread.start()
-        for thread in threads:
-            thread.join(60.0)
+    try:
+        found = script_on_both()
+    except InterruptedScriptError:  # a busy machine
+        found = script_on_both()
     assert motion.settled(found["good"], "ahead") == pytest.approx(0.4, abs=0.005)
     assert motion.settled(found["good"], "left") == pytest.approx(0.5, abs=0.005)
     rows = {row.name: row for row in compare(found["good"], found["bad"])}
@@ -247,11 +257,30 @@ def test_somebody_else_at_the_wheel_is_an_error():
             assert other.close()
 
 
+@pytest.mark.parametrize(("stops", "driven"), [(0, 1), (2, 3), (3, 3)])
+def test_own_robots_are_driven_anew_where_the_machine_was_too_busy(tmp_path, monkeypatch, stops, driven):
+    calls = []
+
+    def over_bus(*words):
+        calls.append(words)
+        if len(calls) <= stops:
+            raise InterruptedScriptError("'twin' did not do 'left' to the end", "Wait.")
+        return "recording"
+
+    monkeypatch.setattr(parity, "over_bus", over_bus)
+    if stops < parity.ATTEMPTS:
+        assert parity.started([], tmp_path, "a", "b", "twin") == "recording"
+    else:
+        with pytest.raises(InterruptedScriptError):
+            parity.started([], tmp_path, "a", "b", "twin")
+    assert len(calls) == driven
+
+
 @pytest.mark.parametrize(
     ("words", "complaint"),
     [
         (["rosbot"], "'rosbot' names no robot"),
-        (["a@127.0.0.1:7447"], "1 robot to compare"),
+        (["a@127.0.0.1:7447"], "parity compares two robots, not 1"),
         (["--world", "nosuch"], "unknown world 'nosuch'"),
         (["--profile", "nosuch"], "unknown profile 'nosuch'"),
     ],

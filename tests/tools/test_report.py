@@ -7,6 +7,7 @@ from synthetic_run import write_run
 
 from fusion.record import LapRecord, StepRecord, read_run
 from hal.errors import StorageError
+from sim_backend.catalogue import load_world
 from tools import cli
 from tools.report import write_report
 from tools.report.course import NOTHING, course
@@ -145,6 +146,36 @@ def test_a_long_straight_course_is_wide(tmp_path):
 
 def test_a_world_that_is_gone_is_drawn_as_empty_floor():
     assert course("gone.toml", 0) == NOTHING
+
+
+@pytest.mark.parametrize(
+    ("world", "painted", "way", "hanging", "marks"),
+    [
+        ("line-obstacles", True, False, 0, False),
+        ("corridor", False, True, 0, True),  # nobody sees the way; spots are painted on the floor
+        ("garden", True, True, 1, True),  # the edge is painted beside the way
+        ("passage", False, True, 1, False),  # a way is closed above the lidar
+        ("forest", False, False, 0, False),
+    ],
+)
+def test_the_floor_is_drawn_as_it_is(world, painted, way, hanging, marks):
+    floor = course(world, 0)
+    assert (bool(floor.line), bool(floor.way), bool(floor.marks)) == (painted, way, marks)
+    assert len(floor.hanging) == hanging
+
+
+def test_paint_beside_the_way_lies_beside_it():
+    floor, offset_m = course("garden", 0), load_world("garden").line.offset_m
+    (x, y), (way_x, way_y) = floor.line[0], floor.way[0]  # the way begins along x
+    assert (x, y) == pytest.approx((way_x, way_y + offset_m))
+
+
+def test_what_hangs_is_framed_over_the_track_and_no_box(tmp_path):
+    run = load_run(write_run(tmp_path, world="passage", unseen=0))
+    drawn, _ = top_view(run.laps[0], course("passage", 0), run.experts)
+    assert drawn.index('class="hanging"') > drawn.rindex('class="steps')
+    assert drawn.index('class="way"') < drawn.index('class="steps')
+    assert 'class="course"' not in drawn
 
 
 def test_every_value_falls_into_a_bin():

@@ -19,7 +19,7 @@ BENCHES = {
     "drivers": "what the drivers need of a core, how old a published scan is, what the lidar's line loses in --minutes",
     "preprocess": "a JPEG of 640x480 to 32x32 gray, beside full decoding and resizing",
     "fuzz": "garbage to every decoder that faces the bus",
-    "soak": "twin and driver over the bus for --minutes: memory, threads and files stay flat",
+    "soak": "twin, learner, joystick bridge and console for --minutes: memory, threads and files stay flat",
 }
 PACKAGES = ("numpy", "opencv-python-headless", "rosbags", "eclipse-zenoh", "pybullet", "torch")
 

@@ -1,6 +1,8 @@
-"""Hours in minutes: a twin and a driver over the bus, watched for memory, threads and files that only grow.
+"""Hours in minutes: a robot at work with all that belongs to it, watched for memory, threads and files that only grow.
 
-The driver drives all the time; now and then the robot is put back to its start. The first fifth is warm-up.
+`lira twin`, `lira fusion`, the bridge of `lira joystick` and the ears of `lira console` run as they do on a desk. Now
+and then a hand takes the wheel and gives it back, the emergency stop is pressed and released, the robot is put back to
+its start, and somebody joins the bus and leaves. The first fifth is warm-up.
 """
 
 import statistics
@@ -8,6 +10,7 @@ import sys
 import time
 from contextlib import ExitStack
 from dataclasses import dataclass, field
+from itertools import combinations
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
@@ -15,19 +18,24 @@ import msgspec
 
 from hal.bus import Bus
 from hal.errors import ConfigError
-from hal.messages import Episode
-from hal.topics import RESET
-from tools.bench import Row
+from hal.estop import press_estop, release_estop
+from hal.messages import STOP, Episode, Source
+from hal.topics import APPLIED, RESET
+from tools.bench import Row, watcher
 from tools.processes import ChildProcess, free_port, lira_command
-from tools.stop_test import driver
+from tools.stop_test import hand
 from tools.stop_test.control import say
 
 MINUTES = 30.0
-READY_S = 40.0
+READY_S = 60.0
 SAMPLE_S = 1.0
-RESET_S = 20.0
 WARM_UP = 0.2
-FLAT_KB = 4096.0  # growth of the median from the first to the last third that still counts as flat
+POINTS = 150  # of a line through the samples
+FLAT_KB = 4096.0  # growth along that line that still counts as flat
+AT_WORK = 0.5  # share of the samples in which policy moves the robot
+# Seconds of a round: what happens then.
+ROUND = {1: "reset", 2: "go", 6: "leave", 20: "press", 21: "release", 22: "go", 26: "leave", 35: "visit"}
+ROUND_S = 40
 
 
 @dataclass(slots=True)
@@ -53,7 +61,7 @@ class Watched:
     def row(self) -> Row:
         """Sum it up."""
         settled = slice(int(len(self.rss_kb) * WARM_UP), None)
-        grown_kb = growth(self.rss_kb[settled])
+        grown_kb = rise(self.rss_kb[settled])
         more_threads, more_files = growth(self.threads[settled]), growth(self.files[settled])
         return {
             "process": self.name,
@@ -68,6 +76,37 @@ class Watched:
         }
 
 
+@dataclass(slots=True)
+class Work:
+    """Whether the robot was at work, and for whom."""
+
+    samples: int = 0
+    moving: dict[Source, int] = field(default_factory=lambda: dict.fromkeys(Source, 0))
+
+    def note(self, source: Source, *, moving: bool) -> None:
+        """One look."""
+        self.samples += 1
+        self.moving[source] += moving
+
+    def row(self) -> Row:
+        """Sum it up: a soak in which nobody drives shows nothing."""
+        policy, teleop = (self.moving[source] / max(self.samples, 1) for source in (Source.POLICY, Source.TELEOP))
+        return {
+            "process": "moved by policy, by hand",
+            "samples": self.samples,
+            "policy_share": policy,
+            "hand_share": teleop,
+            "flat": policy >= AT_WORK and teleop > 0.0,
+        }
+
+
+def rise(values: list[int]) -> float:
+    """How much values grew along the line with the median slope of all pairs: single peaks do not bend it."""
+    points = list(enumerate(values))[:: max(len(values) // POINTS, 1)]
+    slopes = [(after - before) / (late - early) for (early, before), (late, after) in combinations(points, 2)]
+    return statistics.median(slopes) * (len(values) - 1) if slopes else 0.0
+
+
 def growth(values: list[int]) -> float:
     """Median of the last third less that of the first."""
     third = max(len(values) // 3, 1)
@@ -75,7 +114,7 @@ def growth(values: list[int]) -> float:
 
 
 def run(minutes: float = MINUTES) -> list[Row]:
-    """Return a row for the robot and one for the driver. Raises `ConfigError` where there is no /proc."""
+    """Return a row for each process, and whether they were at work. Raises `ConfigError` where there is no /proc."""
     if not Path("/proc/self/status").exists():
         raise ConfigError("this machine does not tell what a process uses", "Run the soak on Linux.")
     name, port, ear = f"soak_{free_port()}", free_port(), free_port()
@@ -87,25 +126,45 @@ def run(minutes: float = MINUTES) -> list[Row]:
             process.wait_ready(ready, READY_S)
             return Watched(what, process)
 
-        module = [sys.executable, "-P", "-m", "tools.stop_test.driver"]
+        python = [sys.executable, "-P", "-m"]
+        there = ["--name", name, "--connect", endpoint]
         watched = [
-            start("robot", lira_command("twin", "--name", name, "--listen", endpoint), "serves"),
-            start("driver", [*module, name, endpoint, "policy", str(ear)], driver.READY),
+            start("lira twin", lira_command("twin", "--name", name, "--listen", endpoint), "serves"),
+            start("lira fusion", lira_command("fusion", "--policy", "camera-expert", *there), "drives"),
+            start("joystick bridge", [*python, hand.__name__, name, endpoint, str(ear)], hand.READY),
+            start("console ears", [*python, watcher.__name__, name, endpoint], watcher.READY),
         ]
         bus = Bus(name, connect=endpoint)
         stack.callback(bus.close)
-        watch(watched, bus, ear, minutes * 60.0)
-    return [one.row() for one in watched]
+        work = watch(watched, bus, ear, minutes * 60.0)
+    return [*(one.row() for one in watched), work.row()]
 
 
-def watch(watched: list[Watched], bus: Bus, ear: int, duration_s: float) -> None:
-    """Sample everything until the time is over."""
-    began_s = reset_s = time.monotonic()
-    while (now_s := time.monotonic()) < began_s + duration_s:
-        if now_s >= reset_s:
-            reset_s = now_s + RESET_S
-            bus.ask(RESET, msgspec.json.encode(Episode()))
-            say(ear, "go")
+def watch(watched: list[Watched], bus: Bus, ear: int, duration_s: float) -> Work:
+    """Sample everything until the time is over, and let things happen meanwhile."""
+    applied, work = bus.reader(APPLIED), Work()
+    began_s, seconds = time.monotonic(), 0
+    while time.monotonic() < began_s + duration_s:
+        if what := ROUND.get(seconds % ROUND_S):
+            happen(what, bus, ear)
         for one in watched:
             one.sample()
-        time.sleep(SAMPLE_S)
+        if (newest := applied.newest()) is not None:
+            work.note(newest.message.source, moving=newest.message.twist != STOP)
+        seconds += 1
+        time.sleep(max(began_s + seconds * SAMPLE_S - time.monotonic(), 0.0))
+    return work
+
+
+def happen(what: str, bus: Bus, ear: int) -> None:
+    """One of the things that happen on a desk."""
+    if what == "reset":
+        bus.ask(RESET, msgspec.json.encode(Episode()))
+    elif what == "press":
+        press_estop(bus)
+    elif what == "release":
+        release_estop(bus)
+    elif what == "visit":
+        Bus(bus.robot, connect=bus.endpoint).close()
+    else:
+        say(ear, what)

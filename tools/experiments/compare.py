@@ -3,12 +3,13 @@
 from collections.abc import Sequence
 from functools import partial
 
-import numpy as np
-
-from tools.experiments.experiment import Experiment, Finding, Outcomes, Row, Table
+from fusion.tasks import task_of
+from tools.experiments.experiment import Experiment, Finding, Outcomes, Picture, Row, Table
+from tools.experiments.measures import by_method, driving_row, effort_row, expert_labels, label_row
 from tools.experiments.methods import HG_DAGGER, LIRA
-from tools.experiments.statistics import iqm, median_interval, paired_ratios
-from tools.experiments.trial import Outcome, Trial
+from tools.experiments.pairs import bounds, ratio, words
+from tools.experiments.pictures import box_pictures, spelt
+from tools.experiments.trial import Trial
 
 QUANTITIES = ("human_labels", "interventions")
 # Table II as printed, in the columns of our summary.
@@ -42,90 +43,60 @@ def trials(seeds: int, world: str) -> list[Trial]:
     return [Trial(method, world, seed) for method in (*LIRA, *HG_DAGGER) for seed in range(seeds)]
 
 
-def by_method(outcomes: Sequence[Outcome]) -> dict[str, list[Outcome]]:
-    """Outcomes of each method, in the order of the seeds."""
-    groups: dict[str, list[Outcome]] = {}
-    for outcome in sorted(outcomes, key=lambda each: each.trial.seed):
-        groups.setdefault(outcome.trial.method.name, []).append(outcome)
-    return groups
+def summary(outcomes: Outcomes) -> list[Row]:
+    """One row per method in the columns of Table II."""
+    return [{"method": method} | label_row(group) for method, group in by_method(outcomes).items()]
 
 
-def summary(outcomes: Sequence[Outcome]) -> list[Row]:
-    """One row per method: medians and interquartile means over the seeds, after the first lap and at the end."""
-    rows: list[Row] = []
-    for method, group in by_method(outcomes).items():
-        first = [outcome.after(1) for outcome in group]
-        final = [outcome.result for outcome in group]
-        unseen = [lap for outcome in group for lap in outcome.laps if lap.phase == "unseen"]
-        rows.append(
-            {
-                "method": method,
-                "n": len(group),
-                "censored": sum(not result.converged for result in final),
-                "laps": _median([result.laps for result in final]),
-                "buffer_first": _median([lap.buffer for lap in first]),
-                "human_labels_first": _median([lap.human_labels for lap in first]),
-                "interventions_first": _median([lap.interventions for lap in first]),
-                "buffer": _median([result.buffer for result in final]),
-                "human_labels": _median([result.human_labels for result in final]),
-                "human_labels_iqm": iqm([result.human_labels for result in final]),
-                "interventions": _median([result.interventions for result in final]),
-                "interventions_iqm": iqm([result.interventions for result in final]),
-                "demonstration": _median([result.demonstration for result in final]),
-                "calls": _median([result.calls for result in final]),
-                "unassisted_laps": sum(any(lap.unassisted for lap in o.laps if lap.phase == "train") for o in group),
-                "unseen_passed": sum(lap.passed for lap in unseen),
-                "unseen_laps": len(unseen),
-                "unseen_collisions": sum(lap.collisions for lap in unseen),
-                "lateral_rms_m": _median([lap.lateral_rms_m or 0.0 for lap in unseen]) if unseen else None,
-            }
-        )
-    return rows
+def ratios(outcomes: Outcomes) -> list[Row]:
+    """HG-DAgger over LIRA-SPF, pair by pair of one seed."""
+    groups = by_method(outcomes)
+    return [
+        {"method": method.name, "against": against.name, "quantity": quantity}
+        | ratio(groups[against.name], groups[method.name], quantity)
+        for method in LIRA
+        for against in HG_DAGGER
+        if method.name in groups and against.name in groups
+        for quantity in QUANTITIES
+    ]
 
 
-def ratios(outcomes: Sequence[Outcome]) -> list[Row]:
-    """HG-DAgger over LIRA-SPF, pair by pair of one seed, with 95 % bootstrap intervals of the median.
+def amortised(outcomes: Outcomes) -> list[Row]:
+    """After how many tasks the labels that trained the experts are paid back by what LIRA-SPF saves on each.
 
-    `censored` counts pairs in which either run met its cap. Where that is HG-DAgger's, its true ratio is larger.
+    A task costs the labels of the demonstration and of the interventions, medians over the seeds.
     """
     groups = by_method(outcomes)
+    cost = {name: effort_row(group)["human_total"] for name, group in groups.items()}
+    experts = sum(expert_labels(task_of(outcomes[0].trial.world)).values())
     rows: list[Row] = []
     for method in (each.name for each in LIRA if each.name in groups):
         for against in (each.name for each in HG_DAGGER if each.name in groups):
-            pairs = list(zip(groups[method], groups[against], strict=True))
-            for quantity in QUANTITIES:
-                values = paired_ratios(
-                    [getattr(theirs.result, quantity) for _, theirs in pairs],
-                    [getattr(ours.result, quantity) for ours, _ in pairs],
-                )
-                median, low, high = median_interval(values)
-                censored = sum(not (a.result.converged and b.result.converged) for a, b in pairs)
-                rows.append(
-                    {
-                        "method": method,
-                        "against": against,
-                        "quantity": quantity,
-                        "median": median,
-                        "low": low,
-                        "high": high,
-                        "n": len(pairs),
-                        "censored": censored,
-                    }
-                )
+            saved = float(str(cost[against])) - float(str(cost[method]))
+            rows.append(
+                {
+                    "method": method,
+                    "against": against,
+                    "experts_labels": experts,
+                    "saved_per_task": saved,
+                    "tasks_until_paid": experts / saved if saved > 0 else None,
+                }
+            )
     return rows
 
 
-def _median(values: Sequence[float]) -> float:
-    return float(np.median(np.asarray(values, dtype=np.float64)))
-
-
 def tables(outcomes: Outcomes, thesis: Sequence[Row]) -> list[Table]:
-    """The methods beside the thesis's, and the paired ratios."""
-    words = ", ".join(f"{value:.2f} {quantity}" for quantity, value in THESIS_RATIOS.items())
-    return [
+    """The methods beside the thesis's, the paired ratios, and what else it took."""
+    theirs = ", ".join(f"{value:.2f} {spelt(quantity)}" for quantity, value in THESIS_RATIOS.items())
+    groups = by_method(outcomes)
+    found = [
         Table("Labels and interventions until the novice passed its proving run", [*summary(outcomes), *thesis]),
-        Table("HG-DAgger over LIRA-SPF, by pairs of one seed", ratios(outcomes), f"Thesis, Table II: {words}."),
+        Table("HG-DAgger over LIRA-SPF, by pairs of one seed", ratios(outcomes), f"Thesis, Table II: {theirs}."),
+        Table("Calls and the human's time", [{"method": name} | effort_row(group) for name, group in groups.items()]),
+        Table("Driving", [{"method": name} | driving_row(group) for name, group in groups.items()]),
+        Table("Labels that trained the experts, paid back", amortised(outcomes), "Labels are medians over the seeds."),
     ]
+    return [table for table in found if table.rows]
 
 
 def findings(outcomes: Outcomes, name: str) -> list[Finding]:
@@ -134,15 +105,24 @@ def findings(outcomes: Outcomes, name: str) -> list[Finding]:
     for row in ratios(outcomes):
         if row["against"] != HG_DAGGER[0].name:
             continue
-        method, quantity = str(row["method"]), str(row["quantity"])
-        median, low, high = (float(str(row[each])) for each in ("median", "low", "high"))
-        ours = f"{median:.2f} [{low:.2f}, {high:.2f}], n {row['n']}, {row['censored']} censored"
-        theirs, words = THESIS_RATIOS[quantity], quantity.replace("_", " ")
-        key = f"{name}.{method}.{quantity}"
-        claim = f"HG-DAgger over {method}, {words}"
-        found.append(Finding(f"{key}.fewer", f"{claim}: above 1", f"{theirs:.2f}", ours, low > 1.0))
-        found.append(Finding(f"{key}.size", f"{claim}: as in Table II", f"{theirs:.2f}", ours, low <= theirs <= high))
+        method, quantity = row["method"], str(row["quantity"])
+        (low, high), theirs = bounds(row), THESIS_RATIOS[quantity]
+        key, claim = f"{name}.{method}.{quantity}", f"HG-DAgger over {method}, {spelt(quantity)}"
+        found += [
+            Finding(f"{key}.fewer", f"{claim}: above 1", f"{theirs:.2f}", words(row), low > 1.0),
+            Finding(f"{key}.size", f"{claim}: as in Table II", f"{theirs:.2f}", words(row), low <= theirs <= high),
+        ]
     return found
+
+
+def figures(outcomes: Outcomes) -> list[Picture]:
+    """Figures 11 and 12, and the ratios."""
+    from tools.experiments import plots
+
+    pictures, rows = box_pictures(by_method(outcomes), QUANTITIES), ratios(outcomes)
+    caption = "HG-DAgger over LIRA-SPF, pair by pair: medians and 95 % intervals"
+    drawn = Picture("ratios", caption, partial(plots.intervals, rows, THESIS_RATIOS))
+    return [*pictures, drawn] if rows else pictures
 
 
 EXPERIMENTS = {
@@ -150,7 +130,9 @@ EXPERIMENTS = {
         trials=partial(trials, world=world),
         tables=partial(tables, thesis=thesis),
         findings=partial(findings, name=name),
+        figures=figures,
         ratios=ratios,
+        methods=tuple(method.name for method in (*LIRA, *HG_DAGGER)),
     )
     for name, world, thesis in (("table2", "line-obstacles", THESIS), ("race", "race", []))
 }

@@ -58,6 +58,7 @@ class Experiment:
 
     `trials(seeds)` lists what is run for seeds 0, 1, ... `seeds - 1`. `ratios` are rows of `method`, `against`,
     `quantity`, `median`, `low`, `high`, `n`, `censored`, for experiments that compare methods pair by pair.
+    `methods` are those of which some may be played alone; none where only all together say something.
     """
 
     trials: Callable[[int], list[Trial]]
@@ -65,3 +66,4 @@ class Experiment:
     findings: Callable[[Outcomes], list[Finding]]
     figures: Callable[[Outcomes], list[Picture]] = lambda _: []
     ratios: Callable[[Outcomes], list[Row]] = lambda _: []
+    methods: tuple[str, ...] = ()

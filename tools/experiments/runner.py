@@ -1,26 +1,78 @@
-"""Runs trials side by side and says how far it is. What is done is kept: run it again to go on."""
+"""Runs the trials that are missing, side by side, and says how far it is. What is done is kept in a folder."""
 
 import sys
-from collections.abc import Sequence
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
+from types import TracebackType
+from typing import Self
 
-from joblib import Parallel, delayed
+import msgspec
+from tqdm import tqdm
 
-from tools.experiments.trial import Outcome, Trial, run_trial
+from tools.experiments.fingerprint import fingerprint
+from tools.experiments.kept import keep, kept
+from tools.experiments.trial import Outcome, Trial
+
+Pool = Callable[[Sequence[Trial]], Iterator[Outcome]]
+"""Plays trials and yields what came of them, in whatever order they end."""
 
 
-def run_trials(trials: Sequence[Trial], folder: Path, workers: int) -> list[Outcome]:
-    """Run the trials on `workers` processes, in order; progress goes to standard error."""
-    running = Parallel(n_jobs=workers, return_as="generator")(delayed(run_trial)(trial, folder) for trial in trials)
-    outcomes: list[Outcome] = []
-    for outcome in running:
-        outcomes.append(outcome)
-        trial, result = outcome.trial, outcome.result
-        how = f"converged after {result.laps} laps" if result.converged else f"not converged in {result.laps} laps"
-        print(
-            f"[{len(outcomes)}/{len(trials)}] {trial.world} {trial.method.name} seed {trial.seed}: {how}, "
-            f"{result.human_labels} human labels, {result.interventions} interventions",
-            file=sys.stderr,
-            flush=True,
-        )
-    return outcomes
+def run_trials(trials: Sequence[Trial], folder: Path, pool: Pool) -> list[Outcome]:
+    """Return the outcomes in the order of the trials: read where the folder has them, else played now.
+
+    An outcome of other code or other experts is played again. Progress goes to standard error. Raises `StorageError`.
+    """
+    prints = {world: fingerprint(world) for world in {trial.world for trial in trials}}
+    done: dict[Trial, Outcome] = {}
+    outdated = 0
+    for trial in trials:
+        outcome = kept(trial, folder)
+        if outcome is None:
+            continue
+        if outcome.fingerprint == prints[trial.world]:
+            done[trial] = outcome
+        else:
+            outdated += 1
+    if outdated:
+        print(f"{outdated} kept trials are of other code or other experts: played again", file=sys.stderr, flush=True)
+    missing = [trial for trial in dict.fromkeys(trials) if trial not in done]
+    with Bar(len(trials), len(trials) - len(missing)) as bar:
+        for played in pool(missing) if missing else ():
+            outcome = msgspec.structs.replace(played, fingerprint=prints[played.trial.world])
+            keep(outcome, folder)
+            done[outcome.trial] = outcome
+            bar.note(outcome)
+    return [done[trial] for trial in trials]
+
+
+class Bar:
+    """A bar on a terminal, else a line for every trial that ends."""
+
+    def __init__(self, total: int, done: int) -> None:
+        self._total, self._done = total, done
+        self._bar = tqdm(total=total, initial=done, unit="trial", disable=not sys.stderr.isatty(), file=sys.stderr)
+
+    def note(self, outcome: Outcome) -> None:
+        """One more has ended."""
+        self._done += 1
+        self._bar.update()
+        tqdm.write(f"[{self._done}/{self._total}] {line(outcome)}", file=sys.stderr)
+        sys.stderr.flush()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self._bar.close()
+
+
+def line(outcome: Outcome) -> str:
+    """How a trial ended, in one line."""
+    trial, result = outcome.trial, outcome.result
+    how = f"converged after {result.laps} laps" if result.converged else f"not converged in {result.laps} laps"
+    return (
+        f"{Path(trial.world).stem} {trial.method.name} {trial.teacher} seed {trial.seed}: {how}, "
+        f"{result.human_labels} human labels, {result.interventions} interventions"
+    )

@@ -7,7 +7,7 @@ import numpy as np
 
 from fusion.lira import LiraSettings
 from fusion.novice import LearningSettings
-from tools.experiments.experiment import Experiment, Finding, Outcomes, Row, Table
+from tools.experiments.experiment import Experiment, Finding, Outcomes, Picture, Row, Table
 from tools.experiments.trial import Method, Trial
 
 Printed = dict[tuple[int, int], tuple[int, int, int | None]]
@@ -104,11 +104,27 @@ def in_order(ours: list[float], theirs: list[int]) -> bool:
     return all((a - b) * (x - y) >= 0 for (a, x), (b, y) in pairs)
 
 
+def figures(outcomes: Outcomes, table: str) -> list[Picture]:
+    """Buffers after two laps as bars beside the thesis's."""
+    from tools.experiments import plots
+
+    rows = summary(outcomes, table)
+    names = [f"theta {theta} %, L {redundancy} %" for theta, redundancy in THESIS[table]]
+    ours = {
+        f"ours, {preset}": [float(str(row["buffer_lap2"])) for row in rows if row["preset"] == preset]
+        for preset in HOLD
+    }
+    series = {**ours, "thesis": [float(second) for _, second, _ in THESIS[table].values()]}
+    words = "Labels in the buffer after two laps"
+    return [Picture("buffer", words, partial(plots.paired_bars, names, series, "labels"))]
+
+
 EXPERIMENTS = {
     table: Experiment(
         trials=partial(trials, table=table),
         tables=partial(tables, table=table),
         findings=partial(findings, table=table),
+        figures=partial(figures, table=table),
     )
     for table in THESIS
 }

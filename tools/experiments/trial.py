@@ -1,6 +1,6 @@
 """One trial: one method taught on one layout by one teacher, from scratch to convergence or its cap."""
 
-import os
+import hashlib
 from functools import cache
 from pathlib import Path
 
@@ -13,17 +13,19 @@ from fusion.lira import LiraSettings
 from fusion.method import Alone
 from fusion.novice import LearningSettings, Novice, is_redundant
 from fusion.preprocess import Features
-from fusion.record import LapRecord, Record, ResultRecord
+from fusion.record import LapRecord, ResultRecord
 from fusion.session import Session
+from fusion.teacher import SKILLED, TeacherSettings
 from fusion.trainer import InlineTrainer
-from hal.errors import StorageError
 from hal.governed import GovernedRobot
 from hal.messages import Action
 from hal.profile import load_profile
 from sim_backend.catalogue import load_world
 from sim_backend.twin import Twin
 from tools.assembly import apprentice, lap, teacher
+from tools.experiments.notes import Notes, Track
 
+PROFILE = "thesis-sim"
 UNSEEN = 1000  # layouts from here on belong to nobody's training
 WARM_WORLD, WARM_STEPS = "line", 250
 
@@ -48,6 +50,7 @@ class Trial(msgspec.Struct, frozen=True):
     world: str
     seed: int
     teacher: str = "scripted"
+    skill: TeacherSettings = SKILLED  # the teacher's, of which `teacher` is the name
     laps: int = 12
     all_laps: bool = False  # go on after the novice has passed
     unseen: int = 3
@@ -55,50 +58,28 @@ class Trial(msgspec.Struct, frozen=True):
 
     @property
     def file(self) -> str:
-        """Name of the file that keeps its outcome."""
-        return f"{Path(self.world).stem}-{self.method.name}-{self.teacher}-{self.seed}.json"
+        """Name of the file that keeps its outcome: readable, and different for whatever is set differently."""
+        digest = hashlib.sha256(msgspec.json.encode(self)).hexdigest()[:8]
+        return f"{Path(self.world).stem}-{self.method.name}-{self.teacher}-{self.seed}-{digest}.json"
 
 
 class Outcome(msgspec.Struct, frozen=True):
-    """What came of a trial. `laps` are all laps in order; a run that did not converge is censored, not dropped."""
+    """What came of a trial. `laps` are all laps in order; a run that did not converge is censored, not dropped.
+
+    `labels` holds the stored labels' actions by source, as in `Account`. `tracks` are those of the first training lap
+    and of everything from the last one on. `fingerprint` says with which code and experts it was played.
+    """
 
     trial: Trial
     laps: tuple[LapRecord, ...]
     result: ResultRecord
+    labels: dict[str, tuple[Action, ...]]
+    tracks: tuple[Track, ...]
+    fingerprint: str = ""
 
     def after(self, lap_number: int) -> LapRecord:
         """Totals after a training lap (the last one if there were fewer)."""
         return [each for each in self.laps if each.phase == "train"][:lap_number][-1]
-
-
-def run_trial(trial: Trial, folder: Path) -> Outcome:
-    """Run a trial, or read its outcome if the folder has it: what was interrupted goes on where it stopped."""
-    path = folder / trial.file
-    if path.exists():
-        kept = read_outcome(path)
-        if kept.trial == trial:
-            return kept
-    outcome = play(trial)
-    draft = path.with_suffix(f".{os.getpid()}.tmp")
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-        draft.write_bytes(msgspec.json.encode(outcome))
-        draft.replace(path)
-    except OSError as error:
-        raise StorageError(
-            f"cannot write {path}: {error.strerror}", "Free some space or choose another folder."
-        ) from error
-    return outcome
-
-
-def read_outcome(path: Path) -> Outcome:
-    """Read what `run_trial` wrote. Raises `StorageError`."""
-    try:
-        return msgspec.json.decode(path.read_bytes(), type=Outcome)
-    except (OSError, msgspec.MsgspecError) as error:
-        raise StorageError(
-            f"{path} is not the outcome of a trial: {error}", "Delete it to run the trial again."
-        ) from error
 
 
 def play(trial: Trial) -> Outcome:
@@ -106,15 +87,10 @@ def play(trial: Trial) -> Outcome:
     import torch
 
     torch.set_num_threads(1)
-    profile, world = load_profile("thesis-sim"), load_world(trial.world)
+    profile, world = load_profile(PROFILE), load_world(trial.world)
     base = msgspec.structs.replace(profile.base, max_linear_m_s=trial.max_linear_m_s)
     profile = msgspec.structs.replace(profile, base=base)
-    laps: list[LapRecord] = []
-
-    def keep(record: Record) -> None:
-        if isinstance(record, LapRecord):
-            laps.append(record)
-
+    notes = Notes()
     twin = Twin(profile, world, layout=trial.seed, seed=trial.seed, renderer="tiny")
     robot = GovernedRobot(twin)
     robot.open()
@@ -123,12 +99,12 @@ def play(trial: Trial) -> Outcome:
         if trial.method.warm:
             warm_up(method.novice)
         loop = ControlLoop(robot, truth=twin.state)
-        session = Session(robot, twin, loop, Journal(write=keep), method)
+        session = Session(robot, twin, loop, Journal(keep=notes.label, write=notes.record), method)
         loop.arm()
-        hand = teacher(trial.teacher, profile, world, trial.seed, trial.seed)
+        hand = teacher(trial.skill, profile, world, trial.seed, trial.seed)
         converged = session.teach([lap(profile, world, trial.seed)], hand, trial.laps, all_laps=trial.all_laps)
         session.show([lap(profile, world, UNSEEN + trial.seed * trial.unseen + k) for k in range(trial.unseen)])
-        return Outcome(trial, tuple(laps), session.result(converged))
+        return Outcome(trial, tuple(notes.laps), session.result(converged), notes.labels, notes.tracks)
     finally:
         method.novice.close()
         robot.close()
@@ -148,7 +124,7 @@ def camera_drive() -> list[tuple[Features, Action]]:
     """What the camera expert sees and does on its own line."""
     from fusion.experts import load_expert
 
-    profile = load_profile("thesis-sim")
+    profile = load_profile(PROFILE)
     expert = load_expert("camera-expert", profile)
     robot = GovernedRobot(Twin(profile, WARM_WORLD, renderer="tiny"))
     robot.open()

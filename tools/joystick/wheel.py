@@ -111,10 +111,10 @@ class Wheel:
         return decisions
 
     def ask(self, request: OperatorRequest, local_s: float) -> None:
-        """Ask something of whoever drives and learns; nothing before the robot was heard."""
+        """Ask something of whoever drives and learns. Before the robot was heard nobody gets it, nor answers."""
+        self._asked = request.request, local_s
         if self._clock.known:
             self._requests.put(request, self._clock.now(local_s))
-            self._asked = request.request, local_s
 
     def answers(self) -> list[OperatorAnswer]:
         """What was answered since the last time, to whomever."""

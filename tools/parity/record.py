@@ -24,6 +24,10 @@ ARM_S = 3.0
 FAREWELL = 3
 
 
+class InterruptedScriptError(BusError):
+    """The robot stopped in the middle: it saw something in its way, or too few commands came through."""
+
+
 @dataclass(frozen=True, slots=True)
 class Heard(Generic[S]):
     """A message, and when it came, on the robot's clock."""
@@ -62,8 +66,8 @@ class Recording:
 def record(bus: Bus, name: str) -> Recording:
     """Drive the robot on the bus through the script.
 
-    Raises `BusError` if it is not there, does not arm or stops in between, `ConfigError` if it does not run in real
-    time.
+    Raises `BusError` if it is not there or does not arm, `InterruptedScriptError` if it stops in between, `ConfigError`
+    if it does not run in real time.
     """
     info = info_from_json(bus.ask(INFO))
     if info.mode == LOCKSTEP:
@@ -136,9 +140,9 @@ class _Driver:
         if not self._obeys():
             applied = self.recording.applied[-1].message if self.recording.applied else None
             why = "nothing" if applied is None else ", ".join([applied.reason.value, *applied.clamps])
-            raise BusError(
+            raise InterruptedScriptError(
                 f"'{self.recording.name}' did not do '{phase.name}' to the end; it says: {why}",
-                "It needs a metre of free floor on all sides, working sensors, and nobody else who drives.",
+                "It needs a metre of free floor on all sides, its sensors, no other driver, and a machine with time.",
             )
 
     def _until(self, done: Any, timeout_s: float, complaint: str) -> None:

@@ -1,22 +1,28 @@
-"""What stands on the floor in one layout of a world, as the top view draws it."""
+"""What is on the floor in one layout of a world, as the top view draws it."""
 
-import math
+from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import lru_cache
 
 from hal.errors import ConfigError
 from sim_backend.catalogue import load_world
-from sim_backend.layout import Block, build
+from sim_backend.layout import Block, Mark, build, outline
+from sim_backend.polyline import Floats
 from tools.report.svg import Point
+
+Outlines = tuple[tuple[Point, ...], ...]
 
 
 @dataclass(frozen=True, slots=True)
 class Course:
-    """The painted line in metres and the outlines of the obstacles, in the world's frame."""
+    """Metres in the world's frame. `way` is where to go where no paint shows it; `hanging` boxes are off the floor."""
 
     line: tuple[Point, ...] = ()
     line_width_m: float = 0.1
-    outlines: tuple[tuple[Point, ...], ...] = ()
+    way: tuple[Point, ...] = ()
+    boxes: Outlines = ()
+    hanging: Outlines = ()
+    marks: Outlines = ()
 
 
 NOTHING = Course()
@@ -30,18 +36,23 @@ def course(world_name: str, layout: int) -> Course:
     except ConfigError:
         return NOTHING
     floor = build(world, layout)
-    outlines = tuple(map(outline, floor.blocks))
-    if world.line is None:
-        return Course(outlines=outlines)
-    return Course(tuple((float(x), float(y)) for x, y in floor.curve.points), world.line.width_m, outlines)
-
-
-def outline(block: Block) -> tuple[Point, ...]:
-    """Return the four corners of a box."""
-    cos, sin = math.cos(block.yaw_rad), math.sin(block.yaw_rad)
-    return tuple(
-        (block.x_m + cos * x - sin * y, block.y_m + sin * x + cos * y)
-        for x, y in (
-            (block.length_m / 2 * side, block.width_m / 2 * end) for side, end in ((1, 1), (-1, 1), (-1, -1), (1, -1))
-        )
+    # Without any line there is no way either, only a direction.
+    hidden = world.line is not None and floor.hidden_way
+    return Course(
+        line=() if floor.paint is None else points(floor.paint),
+        line_width_m=0.1 if world.line is None else world.line.width_m,
+        way=points(floor.curve.points) if hidden else (),
+        boxes=outlines(block for block in floor.blocks if not block.bottom_m),
+        hanging=outlines(block for block in floor.blocks if block.bottom_m),
+        marks=outlines(floor.marks),
     )
+
+
+def outlines(pieces: Iterable[Block | Mark]) -> Outlines:
+    """Return the corners of each."""
+    return tuple(points(outline(piece)) for piece in pieces)
+
+
+def points(rows: Floats) -> tuple[Point, ...]:
+    """Turn an array [n, 2] into points."""
+    return tuple((float(x), float(y)) for x, y in rows)

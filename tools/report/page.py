@@ -123,7 +123,8 @@ def top_views(run: Run) -> str:
             )
     if not figures:
         return section("Where it drove", "No ground truth in this record: only a twin knows where the robot is.", "")
-    note = "One dot per decision: close dots mean slow. ● start. ✕ collision or lost line: put back and driven on."
+    note = "One dot per decision: close dots mean slow. ● start. ✕ collision or lost line: put back and driven on. "
+    note += "Dashed: a way that is not painted. Dotted outlines hang above the floor."
     return section("Where it drove", note, legend(run) + f'<div class="views">{"".join(figures)}</div>')
 
 

@@ -47,14 +47,18 @@ def top_view(lap: Lap, course: Course, experts: Sequence[str]) -> tuple[str, boo
         crosses.append(_cross(track[-1][1]))
     width = f'stroke-width="{number(course.line_width_m)}"'
     parts = [
+        path("".join(polyline(outline, closed=True) for outline in course.marks), "mark"),
         path(polyline(course.line), "course", width),
-        path("".join(polyline(outline, closed=True) for outline in course.outlines), "box"),
+        path(polyline(course.way), "way"),
+        path("".join(polyline(outline, closed=True) for outline in course.boxes), "box"),
     ]
     # The novice first: what the others did is rarer and goes on top.
     for driver in sorted(marks, key=lambda name: (name != "novice", name)):
         css = driver_class(driver, experts)
         parts.append(path("".join(lines[driver]), f"track s-{css}"))
         parts.append(path("".join(marks[driver]), f"steps s-{css}"))
+    # What hangs goes over what drives below it.
+    parts.append(path("".join(polyline(outline, closed=True) for outline in course.hanging), "hanging"))
     parts.append(path(dots([track[0][1]]), "start"))
     parts.append(path("".join(crosses) if harmed else "", "crash"))
     drawn = drawing(box, ['<g transform="scale(1 -1)">', *parts, "</g>"], f"Top view of {lap.title}")
@@ -62,8 +66,9 @@ def top_view(lap: Lap, course: Course, experts: Sequence[str]) -> tuple[str, boo
 
 
 def _bounds(points: Sequence[Point], course: Course) -> tuple[float, float, float, float]:
-    """Return the view box around everything, with y pointing up."""
-    everything = [*points, *course.line, *(corner for outline in course.outlines for corner in outline)]
+    """Return the view box around all but what is only painted on the floor, with y pointing up."""
+    corners = (corner for outline in (*course.boxes, *course.hanging) for corner in outline)
+    everything = [*points, *course.line, *course.way, *corners]
     xs, ys = [x for x, _ in everything], [y for _, y in everything]
     left, top = min(xs) - MARGIN_M, -max(ys) - MARGIN_M
     return left, top, max(xs) + MARGIN_M - left, -min(ys) + MARGIN_M - top

@@ -1,9 +1,9 @@
-"""A driver under test: straight on at full speed, as a policy at the control rate or as a hand at 30 Hz.
+"""A driver under test: straight on at full speed, as a policy at the control rate.
 
 It stands while a sensor is stale or unusable, like the learner, and never arms again by itself. Words: `go` arms and
 drives; `leave` says farewell and falls silent; `mute` falls silent in motion; any other names a way to go wrong.
 
-python -m tools.stop_test.driver NAME HOST:PORT policy|teleop EAR_PORT
+python -m tools.stop_test.driver NAME HOST:PORT EAR_PORT
 """
 
 import math
@@ -13,16 +13,14 @@ from queue import SimpleQueue
 from fusion.preprocess import Preprocessor
 from hal.bus import Bus
 from hal.errors import SensorError
-from hal.messages import STOP, Applied, Command, Reason, Source, Twist
+from hal.messages import HELD, STOP, Applied, Command, Reason, Twist
 from hal.remote import RemoteRobot
 from hal.topics import CMD_VEL
-from tools.stop_test.control import Ear
+from tools.stop_test.control import Ear, tell_time
 
 READY = "driving by word"
-HAND_HZ = 30.0
 FAREWELLS = 3
 HOUR_S = 3600.0
-STOPPED = {Reason.STALE, Reason.NEUTRAL_FIRST, Reason.REFUSED, Reason.ESTOP}
 TWISTS = {"nan": Twist(math.nan, 0.0), "inf": Twist(math.inf, math.inf), "1e308": Twist(1e308, 0.0)}
 STAMPS_S = {"an hour ahead": HOUR_S, "an hour behind": -HOUR_S}
 
@@ -30,11 +28,8 @@ STAMPS_S = {"an hour ahead": HOUR_S, "an hour behind": -HOUR_S}
 class Driver:
     """One commander."""
 
-    def __init__(self, robot: RemoteRobot, source: Source) -> None:
+    def __init__(self, robot: RemoteRobot) -> None:
         self._robot = robot
-        self._source = source
-        self._hand = source is Source.TELEOP
-        self._period_s = 1.0 / HAND_HZ if self._hand else robot.profile.period_s
         self._preprocess = Preprocessor(robot.profile)
         self._liar = robot.bus.publisher(CMD_VEL)  # the remote robot stamps decisions itself, and truly
         self._applied = Applied(STOP, 0.0)
@@ -43,7 +38,10 @@ class Driver:
 
     def hear(self, word: str) -> None:
         """Take a word, from any thread."""
-        self._words.put(word)
+        if word == "what time":
+            tell_time()
+        else:
+            self._words.put(word)
 
     def run(self) -> None:
         """Do what the words say, for ever."""
@@ -56,14 +54,14 @@ class Driver:
                 self._word = "mute"
             elif self._word != "mute" and (wish := self._wish()) is not None:
                 self._drive(wish)
-            self._robot.wait(self._robot.now() + self._period_s)
+            self._robot.wait(self._robot.now() + self._robot.profile.period_s)
 
     def _wish(self) -> Twist | None:
         """What to command; None to say nothing. Zero would arm a robot that stopped by itself: only `go` does that."""
         if self._word == "go" and self._applied.reason is not Reason.OK:
             return STOP
-        if not self._hand and not self._sees():
-            return None if self._applied.reason in STOPPED else STOP
+        if not self._sees():
+            return None if self._applied.reason in HELD else STOP
         return TWISTS.get(self._word, Twist(self._robot.profile.base.max_linear_m_s, 0.0))
 
     def _sees(self) -> bool:
@@ -77,22 +75,21 @@ class Driver:
         if self._word in STAMPS_S:
             self._liar.put(twist, now_s + STAMPS_S[self._word])
             return
-        # A hand answers no observation, so that nobody repeats it.
-        answers = -1 if self._hand else self._robot.read().seq
-        applied = self._applied = self._robot.drive(Command(twist, now_s, self._source, answers, released))
+        command = Command(twist, now_s, answers=self._robot.read().seq, released=released)
+        applied = self._applied = self._robot.drive(command)
         if self._word == "go" and applied.reason is Reason.OK and applied.twist != STOP:
             self._word = "drive"
 
 
-def main(name: str, endpoint: str, role: str, ear_port: int) -> None:
+def main(name: str, endpoint: str, ear_port: int) -> None:
     """Drive by word."""
     robot = RemoteRobot(Bus(name, connect=endpoint))
     robot.open()
-    driver = Driver(robot, Source(role))
+    driver = Driver(robot)
     Ear(ear_port, driver.hear)
     print(READY, flush=True)
     driver.run()
 
 
 if __name__ == "__main__":
-    main(sys.argv[1], sys.argv[2], sys.argv[3], int(sys.argv[4]))
+    main(sys.argv[1], sys.argv[2], int(sys.argv[3]))

@@ -1,160 +1,95 @@
 """The table of faults: how each is made, how it is mended, and what has to stop the robot."""
 
 import signal
-import time
-from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Protocol
 
-from hal.bus import Bus
 from hal.codec import encode
-from hal.estop import press_estop, release_estop
 from hal.messages import Bool
-from tools.processes import ChildProcess
-from tools.relay import LinkFaults, Relay
-from tools.stop_test.intruder import Intruder
+from tools.stop_test import acts
+from tools.stop_test.acts import HOUR_S, Act, driver_word, link, mend_link, nothing, put, robot_word
+from tools.stop_test.stands import BY_WORD, CLOCKS, DRIVERS, FUSION, KEYED, LEARNER, LINK, Stand
 
 STOP_BUDGET_S = 0.35
-FIRMWARE_BUDGET_S = 1.2  # the CORE2's watchdog strikes after 1.0 s, and its ramp takes a moment
-LEASE_GONE_S = 1.2
-
-
-class Bench(Protocol):
-    """What a fault may touch."""
-
-    relay: Relay
-    observer: Bus
-    intruder: Intruder
-
-    @property
-    def driver(self) -> ChildProcess:
-        """The commander under test."""
-
-    @property
-    def robot(self) -> ChildProcess:
-        """The robot's process."""
-
-    def tell_driver(self, word: str) -> None:
-        """Say a word to the commander under test."""
-
-    def tell_robot(self, word: str) -> None:
-        """Say a word to the robot's devices."""
-
-
-Act = Callable[[Bench], None]
-
-
-def _nothing(bench: Bench) -> None:
-    pass
 
 
 @dataclass(frozen=True, slots=True)
 class Fault:
-    """One row: what breaks, for `hold_s`, and what stops the robot.
+    """One row: what breaks, for `hold_s`, on which stand, and what stops the robot.
 
     `silence`: the fault alone is to change nothing, so the commander is stopped dead a moment after it, and that is
     measured. `asks`: once mended the commander would rightly ask for more, so it leaves before. `hand`: the commander
-    is a person's hand, with a policy that drives on beneath it. `frozen`: the robot's process cannot write its journal
-    meanwhile, so the time is worked out from how far it went. `fatal`: the commander is of no use afterwards.
+    is a person's hand, with a policy that drives on beneath it. `counted`: it has to show up among what was refused.
+    `fatal`: the commander is of no use afterwards. `quick`: part of the short matrix.
     """
 
     name: str
     make: Act
-    mend: Act = _nothing
+    mend: Act = nothing
     hold_s: float = 0.8
     stopped_by: str = "watchdog"
-    budget_s: float = STOP_BUDGET_S
+    stand: Stand = BY_WORD
     silence: bool = False
     asks: bool = False
     hand: bool = False
-    frozen: bool = False
+    counted: bool = False
     fatal: bool = False
     quick: bool = False
 
 
-def _signal(number: signal.Signals) -> Act:
-    return lambda bench: bench.driver.signal(number)
-
-
-def _link(**faults: float | bool) -> Act:
-    def change(bench: Bench) -> None:
-        for name, value in faults.items():
-            setattr(bench.relay.faults, name, value)
-
-    return change
-
-
-def _mend_link(bench: Bench) -> None:
-    _link(**{name: getattr(LinkFaults(), name) for name in LinkFaults.__dataclass_fields__})(bench)
-
-
-def _cut(bench: Bench) -> None:
-    bench.relay.faults.dark = True
-    bench.relay.cut()
-
-
-def _driver(word: str) -> Act:
-    return lambda bench: bench.tell_driver(word)
-
-
-def _robot(word: str) -> Act:
-    return lambda bench: bench.tell_robot(word)
-
-
-def _robot_signal(number: signal.Signals) -> Act:
-    return lambda bench: bench.robot.signal(number)
-
-
-def _put(payload: bytes) -> Act:
-    return lambda bench: bench.intruder.put_raw(payload)
-
-
-def _lose_the_lease(bench: Bench) -> None:
-    bench.driver.signal(signal.SIGSTOP)
-    time.sleep(LEASE_GONE_S)
-    bench.intruder.take_lease()
-
-
-KILL, FREEZE, THAW = _signal(signal.SIGKILL), _signal(signal.SIGSTOP), _signal(signal.SIGCONT)
-SEES = "the driver stands"
+KILL, FREEZE = acts.driver_signal(signal.SIGKILL), acts.driver_signal(signal.SIGSTOP)
+THAW = acts.driver_signal(signal.SIGCONT)
+SEES, GUARD = "the driver stands", "the base's guard process"
+DRIVE, WELL = driver_word("drive"), robot_word("")
 RANDOM = bytes(range(7, 255, 3))
 
 FAULTS = (
-    Fault("driver killed (kill -9)", KILL, quick=True),
-    Fault("driver frozen (SIGSTOP)", FREEZE, THAW, quick=True),
-    Fault("hand's bridge killed", KILL, hand=True, quick=True),
-    Fault("hand's bridge frozen", FREEZE, THAW, hand=True),
-    Fault("link cut for 1 s", _cut, _mend_link, hold_s=1.0),
-    Fault("black-out of 0.3 s", _link(dark=True), _mend_link, hold_s=0.3),
-    Fault("black-out of 1 s", _link(dark=True), _mend_link, hold_s=1.0, quick=True),
-    Fault("black-out of 3 s", _link(dark=True), _mend_link, hold_s=3.0),
-    Fault("link delayed by 500 ms", _link(delay_s=0.5), _mend_link, hold_s=1.5),
-    Fault("datagrams twice", _link(copies=2), _mend_link, silence=True),
-    Fault("datagrams swapped", _link(swap=True), _mend_link, silence=True),
-    Fault("commands of nan", _driver("nan"), _driver("drive"), stopped_by="refusal", quick=True),
-    Fault("commands of inf", _driver("inf"), _driver("drive"), stopped_by="refusal"),
-    Fault("commands of 1e308", _driver("1e308"), silence=True),
-    Fault("another type on cmd_vel", _put(encode(Bool(True))), silence=True),
-    Fault("random bytes on cmd_vel", _put(RANDOM), silence=True, quick=True),
-    Fault("stamps an hour ahead", _driver("an hour ahead"), _driver("drive"), hold_s=1.2),
-    Fault("stamps an hour behind", _driver("an hour behind"), _driver("drive"), hold_s=1.2),
-    Fault("second commander", lambda bench: bench.intruder.rival(), silence=True, quick=True),
-    Fault("commander with an old epoch", _lose_the_lease, THAW, fatal=True),
-    Fault("commands replayed after 1 s", lambda bench: bench.intruder.replay(), silence=True),
-    Fault("emergency stop", lambda bench: _ignore(press_estop(bench.observer)), lambda bench: _ignore(
-        release_estop(bench.observer)), stopped_by="e-stop", quick=True),
-    Fault("camera freezes", _robot("camera freezes"), _robot(""), stopped_by=SEES, asks=True),
-    Fault("lidar freezes", _robot("lidar freezes"), _robot(""), stopped_by=SEES, asks=True, quick=True),
-    Fault("half a scan", _robot("half a scan"), _robot(""), stopped_by=SEES, asks=True),
-    Fault("camera read never returns", _robot("camera hangs"), _robot(""), stopped_by=SEES, asks=True, quick=True),
-    Fault("black image", _robot("black image"), _robot(""), stopped_by=SEES, asks=True),
-    Fault("robot's main thread hangs", _robot("main hangs"), silence=True, hold_s=2.0),
-    Fault("base hangs on a command", _robot("base hangs"), _robot(""), hold_s=1.6, stopped_by="firmware",
-          budget_s=FIRMWARE_BUDGET_S),
-    Fault("robot's process frozen", _robot_signal(signal.SIGSTOP), _robot_signal(signal.SIGCONT), hold_s=1.6,
-          stopped_by="firmware", budget_s=FIRMWARE_BUDGET_S, frozen=True),
+    Fault("hand's bridge killed (kill -9)", KILL, hand=True, quick=True),
+    Fault("hand's bridge frozen (SIGSTOP)", FREEZE, THAW, hand=True),
+    Fault("link cut for 1 s", acts.cut_link, mend_link, hold_s=1.0),
+    Fault("black-out of 0.3 s", link(dark=True), mend_link, hold_s=0.3),
+    Fault("black-out of 1 s", link(dark=True), mend_link, hold_s=1.0, quick=True),
+    Fault("black-out of 3 s", link(dark=True), mend_link, hold_s=3.0),
+    Fault("link delayed by 500 ms", link(delay_s=0.5), mend_link, hold_s=1.5),
+    Fault("datagrams twice", link(copies=2), mend_link, silence=True),
+    Fault("datagrams swapped", link(swap=True), mend_link, silence=True),
+    Fault("commands of nan", driver_word("nan"), DRIVE, stopped_by="refusal", counted=True, quick=True),
+    Fault("commands of inf", driver_word("inf"), DRIVE, stopped_by="refusal", counted=True),
+    Fault("commands of 1e308", driver_word("1e308"), silence=True),
+    Fault("another type on cmd_vel", put(encode(Bool(True))), silence=True, counted=True),
+    Fault("random bytes on cmd_vel", put(RANDOM), silence=True, counted=True, quick=True),
+    Fault("stamps an hour ahead", driver_word("an hour ahead"), DRIVE, hold_s=1.2, counted=True),
+    Fault("stamps an hour behind", driver_word("an hour behind"), DRIVE, hold_s=1.2, counted=True),
+    Fault("second commander", lambda bench: bench.intruder.rival(), silence=True, counted=True, quick=True),
+    Fault("commander with an old epoch", acts.lose_the_lease, THAW, counted=True, fatal=True),
+    Fault("commands replayed after 1 s", lambda bench: bench.intruder.replay(), silence=True, counted=True),
+    Fault("emergency stop", acts.press, acts.release, stopped_by="e-stop", quick=True),
+    Fault("camera freezes", robot_word("camera freezes"), WELL, stopped_by=SEES, asks=True),
+    Fault("lidar freezes", robot_word("lidar freezes"), WELL, stopped_by=SEES, asks=True, quick=True),
+    Fault("half a scan", robot_word("half a scan"), WELL, stopped_by=SEES, asks=True),
+    Fault("black image", robot_word("black image"), WELL, stopped_by=SEES, asks=True),
+    Fault("camera read never returns", robot_word("camera hangs"), WELL, stopped_by=SEES, asks=True, quick=True),
+    Fault("robot's main thread hangs", robot_word("main hangs"), silence=True, hold_s=2.0),
+    Fault("lira fusion killed (kill -9)", KILL, stand=FUSION, quick=True),
+    Fault("lira fusion frozen (SIGSTOP)", FREEZE, THAW, hold_s=1.6, stand=FUSION, quick=True),
+    Fault("disk full under labels and record", acts.fill_disk, acts.see_it_told, hold_s=3.0,
+          stopped_by="the learner ends",
+          stand=LEARNER),
+    Fault("link's process killed (kill -9)", acts.kill_link, acts.restart_link, hold_s=1.0, stand=LINK),
+    Fault("robot's process frozen (SIGSTOP)", acts.robot_signal(signal.SIGSTOP), acts.robot_signal(signal.SIGCONT),
+          hold_s=1.6, stopped_by=GUARD, stand=DRIVERS),
+    Fault("robot's process killed (kill -9)", acts.robot_signal(signal.SIGKILL), acts.restart_robot, stopped_by=GUARD,
+          stand=DRIVERS),
+    Fault("base's driver hangs", robot_word("base hangs"), WELL, stopped_by=GUARD, stand=DRIVERS),
+    Fault("robot's clock an hour ahead", acts.clock("robot", HOUR_S), acts.true_clock("robot"), silence=True,
+          stand=CLOCKS),
+    Fault("robot's clock an hour behind", acts.clock("robot", -HOUR_S), acts.true_clock("robot"), silence=True,
+          stand=CLOCKS),
+    Fault("driver's clock an hour ahead", acts.clock("driver", HOUR_S), acts.true_clock("driver"), silence=True,
+          stand=CLOCKS),
+    Fault("driver's clock an hour behind", acts.clock("driver", -HOUR_S), acts.true_clock("driver"), silence=True,
+          stand=CLOCKS),
+    Fault("put without a certificate", lambda bench: bench.intruder.put_plainly(), silence=True, counted=True,
+          stand=KEYED),
+    Fault("put with a viewer's certificate", lambda bench: bench.intruder.put_as("guest"), silence=True, counted=True,
+          stand=KEYED),
 )  # fmt: skip
-
-
-def _ignore(answer: object) -> None:
-    """An acknowledgement came; the journal says the rest."""

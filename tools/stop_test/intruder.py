@@ -1,11 +1,16 @@
-"""Somebody else on the bus, who means no good."""
+"""Somebody else on the bus, who means no good; with keys, also somebody who has none, or not the right ones."""
 
+import threading
 import time
 from collections.abc import Callable
+from pathlib import Path
+
+import zenoh
 
 from hal.attachment import Attachment
 from hal.bus import Bus
 from hal.codec import encode
+from hal.keys import load_keys
 from hal.messages import STOP, Applied, Twist
 from hal.topics import APPLIED, CMD_VEL
 
@@ -14,13 +19,21 @@ PAUSE_S = 0.02
 BACK = Twist(-0.1, 0.0)
 WAIT_S = 5.0
 OLD_S = 1.0
+PLAIN = {
+    "mode": '"peer"',
+    "connect/timeout_ms": "0",
+    "connect/exit_on_failure": "false",
+    "scouting/multicast/enabled": "false",
+    "transport/unicast/open_timeout": "300",
+}
 
 
 class Intruder:
     """Puts commands of every kind on `cmd_vel`, with what it hears from the robot."""
 
-    def __init__(self, bus: Bus) -> None:
+    def __init__(self, bus: Bus, keys: Path | None = None) -> None:
         self._bus = bus
+        self._keys = keys
         self._publisher = bus.publisher(CMD_VEL)
         self._applied = bus.reader(APPLIED)
 
@@ -45,6 +58,26 @@ class Intruder:
     def leave(self) -> None:
         """Let go of the lease."""
         self._publisher.put(STOP, self._hear().stamp_s, released=True)
+
+    def put_plainly(self) -> None:
+        """Put with nothing but zenoh, as a script does that knows the key and has no certificate."""
+        config = zenoh.Config()
+        for key, value in PLAIN.items():
+            config.insert_json5(key, value)
+        config.insert_json5("connect/endpoints", f'["tcp/{self._bus.endpoint}", "udp/{self._bus.endpoint}"]')
+        session = zenoh.open(config)
+        self._repeat(lambda: session.put(f"{self._bus.robot}/{CMD_VEL.key}", encode(BACK)))
+        threading.Thread(target=session.close, daemon=True).start()  # it takes its time while it tries to connect
+
+    def put_as(self, who: str) -> None:
+        """Put with the certificate of another peer."""
+        assert self._keys is not None
+        bus = Bus(self._bus.robot, connect=self._bus.endpoint, keys=load_keys(self._keys / who))
+        publisher, deadline_s = bus.publisher(CMD_VEL), time.monotonic() + WAIT_S
+        while not publisher.matching and time.monotonic() < deadline_s:
+            time.sleep(PAUSE_S)
+        self._repeat(lambda: publisher.put(BACK, self._hear().stamp_s))
+        bus.close()
 
     def _repeat(self, act: Callable[[], None]) -> None:
         for _ in range(TIMES):

@@ -1,6 +1,8 @@
-"""The robot under test: a HAL server in real time on a twin that can be broken by word, and that keeps a journal.
+"""The robot under test: a HAL server in real time that keeps a journal, on a robot that can be broken by word.
 
-python -m tools.stop_test.robot NAME HOST:PORT PROFILE JOURNAL EAR_PORT
+That is a twin, or, with the folder of a world's devices, the physical robot's drivers.
+
+python -m tools.stop_test.robot NAME HOST:PORT PROFILE JOURNAL EAR_PORT [FOLDER CAMERA_URL]
 """
 
 import signal
@@ -15,11 +17,14 @@ import numpy as np
 
 from hal.bus import Bus
 from hal.governed import GovernedRobot
-from hal.messages import Applied, Command, Image, LaserScan, Observation
+from hal.messages import Applied, Image, LaserScan, Observation
+from hal.port import Robot
 from hal.profile import RobotProfile, load_profile
+from hal.refusals import count_refusals
 from hal.server import HalServer, stop_on_signal
+from robot.rosbot import Devices, Rosbot
 from sim_backend.twin import Twin
-from tools.stop_test.control import Ear
+from tools.stop_test.control import Ear, tell_time
 from tools.stop_test.journal import Given, JournalWriter, Truth
 
 READY = "serving"
@@ -36,11 +41,8 @@ class BreakableTwin(Twin):
     fault = ""
     _held: Observation | None = None
 
-    def drive(self, command: Command) -> Applied:
-        """Hang, if told so, as a driver on a dead serial line does."""
-        while self.fault == "base hangs":
-            time.sleep(NAP_S)
-        return super().drive(command)
+    def __init__(self, profile: RobotProfile) -> None:
+        super().__init__(profile, "line", realtime_factor=1.0, renderer="tiny")
 
     def read(self) -> Observation:
         """Read, with the fault in it."""
@@ -61,11 +63,27 @@ class BreakableTwin(Twin):
         return seen
 
 
+class BreakableDrivers(Rosbot):
+    """The physical robot, whose base driver hangs by word, with all of its threads."""
+
+    @property
+    def fault(self) -> str:
+        """What is broken now."""
+        return ""
+
+    @fault.setter
+    def fault(self, word: str) -> None:
+        if word == "base hangs":
+            self.base._lock.acquire()  # every thread of the driver needs it
+        elif self.base._lock.locked():
+            self.base._lock.release()
+
+
 class WatchedRobot(GovernedRobot):
     """Notes down what the wheels are given."""
 
-    def __init__(self, twin: Twin, journal: JournalWriter) -> None:
-        super().__init__(twin)
+    def __init__(self, robot: Robot, journal: JournalWriter) -> None:
+        super().__init__(robot)
         self._journal = journal
 
     def _actuate(self) -> Applied:
@@ -81,31 +99,43 @@ def small_pictures(profile: RobotProfile) -> RobotProfile:
     return msgspec.structs.replace(profile, camera=camera)
 
 
-def main(name: str, endpoint: str, profile_name: str, journal_path: str, ear_port: int) -> None:
+def main(name: str, endpoint: str, profile_name: str, journal_path: str, ear_port: str, *devices: str) -> None:
     """Serve until told to stop."""
-    twin = BreakableTwin(small_pictures(load_profile(profile_name)), "line", realtime_factor=1.0, renderer="tiny")
-    journal = JournalWriter(Path(journal_path))
+    profile, journal = small_pictures(load_profile(profile_name)), JournalWriter(Path(journal_path))
+    robot = open_drivers(profile, *devices) if devices else BreakableTwin(profile)
 
     def hear(word: str) -> None:
         if word == "main hangs":
-            signal.raise_signal(signal.SIGUSR1)
+            signal.pthread_kill(threading.main_thread().ident or 0, signal.SIGUSR1)
+        elif word == "what time":
+            tell_time()
         else:
-            twin.fault = word
+            robot.fault = word
 
-    # Signals are handled in the main thread.
-    signal.signal(signal.SIGUSR1, lambda *_: time.sleep(MAIN_HANGS_S))
-    Ear(ear_port, hear)
-    bus = Bus(name, listen=endpoint)
+    def hang(*_: object) -> None:
+        time.sleep(MAIN_HANGS_S)
+
+    signal.signal(signal.SIGUSR1, hang)  # signals are handled in the main thread
+    Ear(int(ear_port), hear)
+    bus = Bus(name, listen=endpoint, refusals=count_refusals())
     try:
         with stop_on_signal() as stop:
+            twin = robot if isinstance(robot, Twin) else None
 
             def ready() -> None:
-                threading.Thread(target=keep_truth, args=(twin, journal), daemon=True).start()
+                if twin is not None:
+                    threading.Thread(target=keep_truth, args=(twin, journal), daemon=True).start()
                 print(READY, flush=True)
 
-            HalServer(WatchedRobot(twin, journal), bus, twin, ready=ready).run(stop)
+            HalServer(WatchedRobot(robot, journal), bus, twin, ready=ready).run(stop)
     finally:
         bus.close()
+
+
+def open_drivers(profile: RobotProfile, folder: str, camera_url: str) -> "BreakableDrivers":
+    """Return the physical robot on the devices in a folder."""
+    devices = Devices(base=f"{folder}/core2", lidar=f"{folder}/rplidar", camera=camera_url)
+    return BreakableDrivers(profile, devices)
 
 
 def keep_truth(twin: Twin, journal: JournalWriter) -> None:
@@ -117,4 +147,4 @@ def keep_truth(twin: Twin, journal: JournalWriter) -> None:
 
 
 if __name__ == "__main__":
-    main(sys.argv[1], sys.argv[2], sys.argv[3], sys.argv[4], int(sys.argv[5]))
+    main(*sys.argv[1:])

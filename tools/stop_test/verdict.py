@@ -31,13 +31,8 @@ def judge(
     broken_s: float,
     end_s: float,
     profile: RobotProfile,
-    *,
-    frozen: bool = False,
 ) -> Verdict:
-    """Judge what was noted from the fault on. The wheels have zero when told so, or when the body stands by itself.
-
-    `frozen`: nothing could be noted in between, so the time is that of the way at full speed.
-    """
+    """Judge what was noted from the fault on. The wheels have zero when told so, or when the body stands by itself."""
     after = [one for one in given if one.time_s >= broken_s]
     moving = [one for one in after if one.moving] or [one for one in given if one.moving][-1:]
     if not moving:
@@ -50,9 +45,8 @@ def judge(
     again = [one for one in after if one.moving and one.time_s > zero_at_s]
     limit_s = profile.control.policy_timeout_s + TICK_S
     distance_m = _path_m([one for one in truth if last_command_s <= one.time_s <= end_s])
-    zero_s = distance_m / profile.base.max_linear_m_s if frozen else max(zero_at_s - last_command_s, 0.0)
     return Verdict(
-        zero_s=zero_s,
+        zero_s=max(zero_at_s - last_command_s, 0.0),
         distance_m=distance_m,
         stale_obeyed=sum(one.age_s > limit_s for one in after if one.moving),
         moved_unasked=bool(again),
@@ -69,10 +63,13 @@ def _path_m(points: Sequence[Truth]) -> float:
     return float(np.hypot(*np.diff(xy, axis=0).T).sum()) if len(xy) > 1 else 0.0
 
 
-def summarize(fault: str, stopped_by: str, verdicts: Sequence[Verdict], budget_s: float) -> Row:
-    """Sum the trials of one fault up, in the columns of the issue."""
+def summarize(
+    fault: str, stopped_by: str, verdicts: Sequence[Verdict], budget_s: float, *, counted: bool = False
+) -> Row:
+    """Sum the trials of one fault up. `counted`: each has to show up among what was refused."""
     zeros_s = [one.zero_s for one in verdicts]
     worst_s = max(zeros_s)
+    told = all(one.refused > 0 for one in verdicts) or not counted
     stale, moved = sum(one.stale_obeyed for one in verdicts), any(one.moved_unasked for one in verdicts)
     return {
         "fault": fault,
@@ -86,5 +83,5 @@ def summarize(fault: str, stopped_by: str, verdicts: Sequence[Verdict], budget_s
         "refused": sum(one.refused for one in verdicts),
         "stopped_by": stopped_by,
         "budget_s": budget_s,
-        "passed": worst_s <= budget_s and stale == 0 and not moved,
+        "passed": worst_s <= budget_s and stale == 0 and not moved and told,
     }

@@ -43,10 +43,15 @@ def run(args: argparse.Namespace) -> int:
         text = json.dumps({"name": args.name, "machine": describe_machine(), "results": results}, indent=2)
         if args.json == "-":
             print(text, file=output, flush=True)
-            return 0
+            return exit_status(results)
         write_file(Path(args.json), text)
     print(table(results), file=output)
-    return 0
+    return exit_status(results)
+
+
+def exit_status(results: list[Row]) -> int:
+    """1 if a row says that something that has to stay flat did not."""
+    return 1 if any(row.get("flat") is False for row in results) else 0
 
 
 def take_stdout() -> TextIO:

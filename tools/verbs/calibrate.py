@@ -12,19 +12,25 @@ examples:
 
 import argparse
 import math
+import signal
 import sys
+from collections.abc import Iterator
+from contextlib import closing, contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from hal.errors import ConfigError
 
 if TYPE_CHECKING:
-    from tools.calibration import Manoeuvre
+    from robot.settings import BaseSettings
+    from tools.calibration import Manoeuvre, Way
 
 COARSE_RAD = math.pi  # reported: enough to know how many turns the fine one really makes
 COARSE_WINDOW_RAD = math.radians(45.0)
 FINE_WINDOW_RAD = math.radians(20.0)
 PLAUSIBLE = (0.67, 1.5)
+MOST_SLIP_M_RAD = 0.05
+NO_WALL = ("there is no flat wall straight ahead", "Put the robot square before a wall, 2 to 3 m away")
 KEYS = {"distance": "distance_scale", "turn": "turn_scale"}
 
 
@@ -62,21 +68,46 @@ def run(args: argparse.Namespace) -> int:
     wanted = [name for name in KEYS if args.only in (None, name)]
     ask_for_consent(args, wanted)
     robot = GovernedRobot(Rosbot(profile, Devices(args.base, args.lidar, settings=settings)))
-    try:
+    with ended_like_ctrl_c(), closing(robot):
         robot.open()
         manoeuvre = Manoeuvre(robot, Pace())
         for name in wanted:
             measure = (by_the_lidar if by_lidar else by_tape)[name]
-            true, reported = measure(manoeuvre, args)
-            before = getattr(settings.base, KEYS[name])
-            scale = checked(name, before * true / reported)
+            true, way = measure(manoeuvre, args)
             unit = "m" if name == "distance" else "rad"
-            print(f"{name}: reported {reported:.3f} {unit}, measured {true:.3f} {unit}", flush=True)
-            write_base_setting(args.settings, KEYS[name], scale)
-            print(f"  {KEYS[name]} {before:.4f} -> {scale:.4f}, written to {args.settings}", flush=True)
-    finally:
-        robot.close()
+            print(f"{name}: reported {way.done:.3f} {unit}, measured {true:.3f} {unit}", flush=True)
+            for key, value in found(name, settings.base, true, way).items():
+                write_base_setting(args.settings, key, value)
+                print(
+                    f"  {key} {getattr(settings.base, key):.4f} -> {value:.4f}, written to {args.settings}", flush=True
+                )
     return 0
+
+
+def found(name: str, before: "BaseSettings", true: float, way: "Way") -> dict[str, float]:
+    """Return the settings that make what was reported true. Raises `CalibrationError` for what cannot be right."""
+    scale = getattr(before, KEYS[name]) * true / way.done
+    if not PLAUSIBLE[0] <= scale <= PLAUSIBLE[1]:
+        raise not_measured(f"a scale of {scale:.2f} for the {name} cannot be right", "Measure again")
+    if name == "distance":
+        return {KEYS[name]: scale}
+    # On the spot it goes nowhere: what it reports beside the turn is slip, in the board's own metres and radians.
+    slip = before.spin_slip_m_rad + way.ahead_m / before.distance_scale / (way.turn_rad / before.turn_scale)
+    if abs(slip) > MOST_SLIP_M_RAD:
+        raise not_measured(f"{slip:.3f} m ahead for each radian of a turn cannot be right", "Turn it on an even floor")
+    return {KEYS[name]: scale, "spin_slip_m_rad": slip}
+
+
+@contextmanager
+def ended_like_ctrl_c() -> Iterator[None]:
+    """Let a kill, and a terminal that goes away, end this as Ctrl-C does: wheels at zero, lidar still."""
+    numbers = (signal.SIGTERM, signal.SIGHUP)
+    before = [signal.signal(number, signal.default_int_handler) for number in numbers]
+    try:
+        yield
+    finally:
+        for number, handler in zip(numbers, before, strict=True):
+            signal.signal(number, handler)
 
 
 def ask_for_consent(args: argparse.Namespace, wanted: list[str]) -> None:
@@ -94,51 +125,53 @@ def ask_for_consent(args: argparse.Namespace, wanted: list[str]) -> None:
         raise ConfigError("the way is not free", "Nothing was moved and nothing was written.")
 
 
-def distance_by_lidar(manoeuvre: "Manoeuvre", args: argparse.Namespace) -> tuple[float, float]:
-    """Return true and reported metres: the wall ahead comes nearer by what was driven."""
+def distance_by_lidar(manoeuvre: "Manoeuvre", args: argparse.Namespace) -> tuple[float, "Way"]:
+    """Return true metres and the way: the wall ahead comes nearer by what was driven."""
     from robot.calibration import wall_ahead_m
 
     manoeuvre.check(ahead_m=args.distance, lidar=True)
     before_m = wall_ahead_m(manoeuvre.scan())
-    reported_m = manoeuvre.ahead(args.distance) if before_m is not None else 0.0
-    after_m = wall_ahead_m(manoeuvre.scan()) if before_m is not None else None
-    if before_m is None or after_m is None:
-        raise not_measured("there is no flat wall straight ahead", "Put the robot square before a wall, 2 to 3 m away")
-    return before_m - after_m, reported_m
+    if before_m is None:
+        raise not_measured(*NO_WALL)
+    way = manoeuvre.ahead(args.distance)
+    after_m = wall_ahead_m(manoeuvre.scan())
+    if after_m is None:
+        raise not_measured(*NO_WALL)
+    return before_m - after_m, way
 
 
-def turn_by_lidar(manoeuvre: "Manoeuvre", args: argparse.Namespace) -> tuple[float, float]:
-    """Return true and reported radians: a small turn tells roughly, then the whole one exactly."""
+def turn_by_lidar(manoeuvre: "Manoeuvre", args: argparse.Namespace) -> tuple[float, "Way"]:
+    """Return true radians and the way: a small turn tells roughly, then the whole one exactly."""
     from robot.calibration import turn_between
 
     manoeuvre.check(turns=True, lidar=True)
     first = manoeuvre.scan()
-    reported_rad = manoeuvre.turn(COARSE_RAD)
+    reported_rad = manoeuvre.turn(COARSE_RAD).turn_rad
     second = manoeuvre.scan()
     coarse_rad = turn_between(first, second, reported_rad, COARSE_WINDOW_RAD)
     if coarse_rad is None:
         raise not_measured("the surroundings look alike at several turns", "Turn it where walls and corners are near")
-    reported_more_rad = manoeuvre.turn(args.turns * math.tau)
-    expected_rad = reported_more_rad * coarse_rad / reported_rad
+    way = manoeuvre.turn(args.turns * math.tau)
+    expected_rad = way.turn_rad * coarse_rad / reported_rad
     true_rad = turn_between(second, manoeuvre.scan(), expected_rad, FINE_WINDOW_RAD)
     if true_rad is None:
         raise not_measured("the turn cannot be told from the scans", "Keep the room still, and give fewer --turns")
-    return true_rad, reported_more_rad
+    return true_rad, way
 
 
-def distance_by_tape(manoeuvre: "Manoeuvre", args: argparse.Namespace) -> tuple[float, float]:
-    """Return true and reported metres; a person measures."""
+def distance_by_tape(manoeuvre: "Manoeuvre", args: argparse.Namespace) -> tuple[float, "Way"]:
+    """Return true metres and the way; a person measures."""
     manoeuvre.check(ahead_m=args.distance, lidar=args.lidar is not None)
-    reported_m = manoeuvre.ahead(args.distance)
-    return ask_number("How many metres did it drive? "), reported_m
+    way = manoeuvre.ahead(args.distance)
+    return ask_number("How many metres did it drive? "), way
 
 
-def turn_by_tape(manoeuvre: "Manoeuvre", args: argparse.Namespace) -> tuple[float, float]:
-    """Return true and reported radians; a person looks at a mark."""
+def turn_by_tape(manoeuvre: "Manoeuvre", args: argparse.Namespace) -> tuple[float, "Way"]:
+    """Return true radians and the way; a person looks at a mark."""
     manoeuvre.check(turns=True, lidar=args.lidar is not None)
-    reported_rad = manoeuvre.turn(args.turns * math.tau)
+    way = manoeuvre.turn(args.turns * math.tau)
     beyond_deg = ask_number(f"How many degrees beyond {args.turns:g} turns did it go (short: negative)? ")
-    return args.turns * math.tau + math.radians(beyond_deg), reported_rad
+    return args.turns * math.tau + math.radians(beyond_deg), way
 
 
 by_the_lidar = {"distance": distance_by_lidar, "turn": turn_by_lidar}
@@ -154,13 +187,6 @@ def ask_number(question: str) -> float:
             raise not_measured("nobody says what was measured", "Run it in a terminal") from error
         except ValueError:
             print("A number, for example 1.04.", flush=True)
-
-
-def checked(name: str, scale: float) -> float:
-    """Return a scale that can be true. Raises `CalibrationError`."""
-    if not PLAUSIBLE[0] <= scale <= PLAUSIBLE[1]:
-        raise not_measured(f"a scale of {scale:.2f} for the {name} cannot be right", "Measure again")
-    return scale
 
 
 def not_measured(what: str, remedy: str) -> Exception:

@@ -1,55 +1,133 @@
 """Repeat an experiment of the thesis on the twin, in process, and print its tables beside the thesis's.
 
 Trials of one seed share the layout and the teacher's faults, whatever the method. Each trial that ends is kept in the
-folder: run the same command again to go on, or with more seeds to add to it. A run that did not converge within its
-laps is counted as censored, with the labels it had used by then.
+folder: run the same command again to go on, or with more seeds to add to it. A trial of other code or other experts
+than today's is played again. A run that did not converge within its laps is counted as censored, with the labels it had
+used by then. The folder also gets a page (NAME.html) and the drawings.
+
+'all' does every experiment, keeps their summaries and writes RESULTS.md; 'results' writes RESULTS.md alone.
 
 examples:
   lira experiment table2 --seeds 10 --workers 2
-  lira experiment race --seeds 10 --workers 2 --json race.json
-  lira experiment tableC1
+  lira experiment table2 --seeds 10 --workers 2 --methods hold,hg-dagger
+  lira experiment race --seeds 10 --scheduler tcp://192.168.1.5:8786 --json race.json
+  lira experiment all --seeds 10 --workers 2
+  lira experiment results
 """
 
 import argparse
-import json
+from collections.abc import Sequence
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from hal.errors import ConfigError
-from tools.experiments.registry import REGISTRY
+from tools.experiments.registry import REGISTRY, load
+
+if TYPE_CHECKING:
+    from tools.experiments.summary import Summary
+
+FOLDER = Path("runs") / "experiments"
+ALL, RESULTS = "all", "results"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
     names = "; ".join(f"{name}: {entry.words}" for name, entry in REGISTRY.items())
     add = parser.add_argument
-    add("name", choices=REGISTRY, metavar="NAME", help=names)
+    add("name", choices=[*REGISTRY, ALL, RESULTS], metavar="NAME", help=f"{names}; {ALL}; {RESULTS}")
     add("--seeds", type=int, default=3, help="repetitions, seeds 0, 1, 2, ... (default: %(default)s)")
+    add("--methods", metavar="NAMES", help="of table2 and race, play only these, separated by commas")
     add("--workers", type=int, default=1, help="processes side by side (default: %(default)s)")
-    add("--run", type=Path, metavar="DIR", help="folder that keeps the trials (default: runs/experiments)")
+    add("--scheduler", metavar="ADDRESS", help="run on this Dask cluster instead, like tcp://192.168.1.5:8786")
+    add("--run", type=Path, default=FOLDER, metavar="DIR", help="keeps the trials and pages (default: %(default)s)")
     add("--json", metavar="FILE", help="write a JSON object to FILE (-: standard output)")
+    add("--summaries", type=Path, metavar="DIR", help="summaries of all experiments (default: those of the project)")
+    add("--out", type=Path, metavar="FILE", help="where all and results write (default: the project's RESULTS.md)")
 
 
 def run(args: argparse.Namespace) -> int:
     """Run the trials that are missing and print the tables."""
-    from tools.experiments.registry import load
-    from tools.experiments.runner import run_trials
-    from tools.verbs.bench import table, take_stdout, write_file
+    from tools.experiments.summary import to_json
+    from tools.verbs.bench import take_stdout, write_file
 
     if args.seeds < 1 or args.workers < 1:
         raise ConfigError("--seeds and --workers are at least 1", "Give a positive number.")
-    experiment = load(args.name)
+    if args.name in (ALL, RESULTS):
+        return write_results(args)
     output = take_stdout() if args.json == "-" else None
-    outcomes = run_trials(experiment.trials(args.seeds), args.run or Path("runs") / "experiments", args.workers)
-    tables = experiment.tables(outcomes)
+    summary, page = play(args, args.name)
+    if output is not None:
+        print(to_json(summary), file=output, flush=True)
+        return 0
     if args.json is not None:
-        report = {"name": args.name, "results": tables[0].rows, "ratios": experiment.ratios(outcomes)}
-        text = json.dumps(report, indent=2)
-        if output is not None:
-            print(text, file=output, flush=True)
-            return 0
-        write_file(Path(args.json), text)
-    for each in tables:
+        write_file(Path(args.json), to_json(summary))
+    show(summary, page)
+    return 0
+
+
+def play(args: argparse.Namespace, name: str) -> "tuple[Summary, Path]":
+    """Run one experiment; return its summary and its page."""
+    from tools.experiments.page import write_page
+    from tools.experiments.pools import Cluster, Here
+    from tools.experiments.runner import run_trials
+    from tools.experiments.summary import summarise
+
+    experiment = load(name)
+    pool = Here(args.workers) if args.scheduler is None else Cluster(args.scheduler)
+    chosen = chosen_methods(args.methods, experiment.methods, name)
+    trials = [trial for trial in experiment.trials(args.seeds) if not chosen or trial.method.name in chosen]
+    outcomes = run_trials(trials, args.run, pool)
+    command = f"lira experiment {name} --seeds {args.seeds}" + (f" --methods {args.methods}" if chosen else "")
+    summary = summarise(name, REGISTRY[name].words, command, args.seeds, experiment, outcomes)
+    return summary, write_page(args.run, summary, experiment.figures(outcomes))
+
+
+def chosen_methods(words: str | None, known: Sequence[str], name: str) -> set[str]:
+    """Return the methods that were asked for; nothing means all. Raises `ConfigError`."""
+    if words is None:
+        return set()
+    if not known:
+        raise ConfigError(f"{name} takes no --methods", "It needs all of its methods together.")
+    chosen = set(words.split(","))
+    if not chosen <= set(known):
+        raise ConfigError(f"{name} has no method '{min(chosen - set(known))}'", f"Known: {', '.join(known)}.")
+    return chosen
+
+
+def show(summary: "Summary", page: Path) -> None:
+    """Print tables, verdicts and where the page is."""
+    from tools.verbs.bench import table
+
+    for each in summary.tables:
         print(f"\n{each.title}\n{table(each.rows)}")
         if each.note:
             print(each.note)
+    if summary.findings:
+        print("\nAgainst the thesis")
+    for finding in summary.findings:
+        verdict = "agrees" if finding.agrees else "differs"
+        print(f"  {verdict:<8} {finding.claim}; thesis {finding.thesis}; ours {finding.ours}")
+    print(f"\npage: {page}")
+
+
+def write_results(args: argparse.Namespace) -> int:
+    """Play everything first if asked to; then write RESULTS.md from the summaries that are there."""
+    from tools.experiments import document
+    from tools.experiments.summary import read_summaries, to_json
+    from tools.verbs.bench import write_file
+
+    if args.methods is not None:
+        raise ConfigError(f"{args.name} takes no --methods", "It is about all of them.")
+    folder = args.summaries or document.SUMMARIES
+    for name in REGISTRY if args.name == ALL else ():
+        print(f"\n{name}: {REGISTRY[name].words}")
+        summary, page = play(args, name)
+        write_file(folder / f"{name}.json", to_json(summary))
+        show(summary, page)
+    summaries = read_summaries(folder, list(REGISTRY))
+    if not summaries:
+        raise ConfigError(f"{folder} holds no summary", "Make them with: lira experiment all")
+    out = args.out or document.DOCUMENT
+    document.write_document(out, document.document(summaries, document.read_causes()))
+    print(f"results: {out}")
     return 0

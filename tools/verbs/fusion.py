@@ -60,9 +60,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     add(
         "--teacher",
-        choices=("none", "scripted", "perfect"),
+        choices=("none", "scripted", "perfect", "unskilled"),
         default="none",
-        help="who helps: a person with a gamepad (none), or on a twin a script with or without a human's faults",
+        help="who helps: a person with a gamepad (none), or on a twin a script with few, no or many human faults",
     )
     add(
         "--train-laps",
@@ -138,6 +138,7 @@ def teach(args: argparse.Namespace, robot: "RemoteRobot", arena: "Arena", arena_
     from fusion.journal import Journal
     from fusion.record import RunWriter
     from fusion.session import Session
+    from fusion.teacher import TEACHERS
     from fusion.trainer import ProcessTrainer
     from sim_backend.world import World
     from tools.assembly import apprentice, lap, teacher
@@ -159,7 +160,7 @@ def teach(args: argparse.Namespace, robot: "RemoteRobot", arena: "Arena", arena_
             loop = ControlLoop(robot, truth=arena.state)
             session = Session(robot, arena, loop, journal, method)
             loop.arm()
-            hand = teacher(args.teacher, profile, world, args.layout, args.seed)
+            hand = teacher(TEACHERS[args.teacher], profile, world, args.layout, args.seed)
             converged = session.teach([lap(profile, world, args.layout)], hand, args.train_laps)
             snapshot(folder, method.novice, profile, args)()
             session.show([lap(profile, world, args.layout + 1 + k) for k in range(args.unseen)])

@@ -1,7 +1,7 @@
 """Compare two robots: the same script of motions on both, then rates, ages, step responses, scans and pictures.
 
 Without robots it compares the twin with itself: directly on the bus, and through the drivers of the real robot on
-emulated devices. Robots are named NAME@HOST:PORT. Put both in the same place, one after the other if need be, with a
+emulated devices. Robots are named NAME@HOST:PORT. Put both in the same place, a twin into a world of your room, with a
 metre of free floor on all sides: each stands for 3 s, then goes ahead, back, left and right. Stand by the switch.
 
 examples:
@@ -14,6 +14,7 @@ exit status: 0 if nothing differs by more than is allowed, 1 if something does, 
 """
 
 import argparse
+import signal
 import sys
 from contextlib import ExitStack
 from pathlib import Path
@@ -30,6 +31,7 @@ if TYPE_CHECKING:
 
 PAGE = "parity.html"
 OWN = ("twin", "wire")
+ATTEMPTS = 3
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -50,7 +52,10 @@ def run(args: argparse.Namespace) -> int:
 
     ends = [address(word) for word in args.robots]
     if len(ends) not in (0, 2):
-        raise ConfigError(f"{len(ends)} robot to compare", "Name two, or none for the twin's own comparison.")
+        raise ConfigError(
+            f"parity compares two robots, not {len(ends)}", "Name two, or none for the twin and its wire."
+        )
+    signal.signal(signal.SIGTERM, signal.default_int_handler)  # whoever ends this stops the robot and own processes
     first, second = [over_bus(*end) for end in ends] if ends else own(args)
     rows = compare(first, second)
     show(args, first, second, rows)
@@ -106,9 +111,16 @@ def own(args: argparse.Namespace) -> "tuple[Recording, Recording]":
 
 
 def started(parts: "list[Part]", logs: Path, name: str, endpoint: str, shown: str) -> "Recording":
-    """Start a robot's processes, drive it, and stop them."""
+    """Start a robot's processes, drive it, and stop them; from the beginning again if the machine was too busy."""
+    from tools.parity.record import InterruptedScriptError
     from tools.rig import running
 
+    for _ in range(ATTEMPTS - 1):
+        try:
+            with running(parts, logs):
+                return over_bus(name, endpoint, shown)
+        except InterruptedScriptError as error:
+            print(f"{error.what}; once more", file=sys.stderr, flush=True)
     with running(parts, logs):
         return over_bus(name, endpoint, shown)
 

@@ -1,17 +1,22 @@
-"""Train one of the two single-sensor experts with HG-DAgger in the digital twin (thesis, appendix E.1).
+"""Train one of a task's two single-sensor experts with HG-DAgger in the digital twin (thesis, appendices E.1, F.1).
 
 The scripted teacher drives whenever the young expert would err; only what the teacher drives is learned. Training
 ends when the expert alone passes all drives of its curriculum. The experts that come with the project were made by
 this command with its defaults.
 
+tasks: line (line-obstacles, race and the figure-eights), passage, garden, corridor; the corridor's lidar expert is the
+garden's. Other pairs, for an experiment's --experts DIR: --out DIR/camera.safetensors, DIR/lidar.safetensors.
+
 examples:
   lira train-expert camera
+  lira train-expert camera --task passage
   lira train-expert lidar --seed 3 --out my-lidar.safetensors
 """
 
 import argparse
 from pathlib import Path
 
+from fusion.tasks import DEFAULT, TASKS
 from hal.errors import LiraError, StorageError
 from tools.arguments import natural
 
@@ -19,7 +24,8 @@ from tools.arguments import natural
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the verb's arguments."""
     parser.add_argument("expert", choices=["camera", "lidar"], help="which sensor it sees")
-    parser.add_argument("--profile", default="thesis-sim", help="robot profile (default: %(default)s)")
+    parser.add_argument("--task", choices=TASKS, default=DEFAULT, help="what it is for (default: %(default)s)")
+    parser.add_argument("--profile", help="robot profile (default: the task's)")
     parser.add_argument("--seed", type=natural, default=0, help="seed of everything random (default: %(default)s)")
     parser.add_argument("--out", type=Path, help="checkpoint to write (default: the one that comes with the project)")
 
@@ -30,14 +36,16 @@ def run(args: argparse.Namespace) -> int:
     from hal.profile import load_profile
     from tools.training import train_expert
 
-    profile = load_profile(args.profile)
-    path = args.out or shipped_path(args.expert, profile)
+    profile_name = args.profile or TASKS[args.task].profile
+    profile = load_profile(profile_name)
+    path = args.out or shipped_path(args.expert, profile, args.task)
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise StorageError(f"cannot write {path}: {error.strerror}", "Choose another folder.") from error
-    command = f"lira train-expert {args.expert} --profile {args.profile} --seed {args.seed}"
-    passed = train_expert(args.expert, profile, args.seed, path, command)
+    words = "" if args.task == DEFAULT else f" --task {args.task}"
+    command = f"lira train-expert {args.expert}{words} --profile {profile_name} --seed {args.seed}"
+    passed = train_expert(args.expert, args.task, profile, args.seed, path, command)
     if not passed:
         raise LiraError("the expert did not pass its curriculum; nothing was saved", "Try another --seed.")
     return 0

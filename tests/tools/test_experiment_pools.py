@@ -1,0 +1,205 @@
+"""Where trials are played: a Dask cluster of real processes on this machine, and what is played again."""
+
+import os
+import shutil
+import socket
+import subprocess
+import sys
+import termios
+import time
+from contextlib import contextmanager, suppress
+from pathlib import Path
+
+import msgspec
+import pytest
+from made_up_outcomes import HOLD
+from short_trials import short_trial, timeless, write_world
+
+from hal.errors import ConfigError
+from tools.cli import main
+from tools.experiments import fingerprint as fingerprints
+from tools.experiments.fingerprint import code, fingerprint, imported, sources
+from tools.experiments.kept import keep, kept
+from tools.experiments.pools import Cluster, Here
+from tools.experiments.runner import run_trials
+from tools.experiments.trial import play
+from tools.processes import free_port
+
+START_S = 60.0
+
+
+def nothing(trials):
+    """A pool that must not be needed."""
+    assert not trials
+    yield from ()
+
+
+@contextmanager
+def cluster(*, workers, threads=1):
+    """A scheduler and its workers as separate processes; yields the address."""
+    address = f"tcp://127.0.0.1:{free_port()}"
+    dask = [sys.executable, "-m", "dask"]
+    quiet = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL}
+    plain = ["--no-dashboard", "--host", "127.0.0.1"]
+    where = Path(__file__).parents[2]
+    processes = [subprocess.Popen([*dask, "scheduler", *plain, "--port", address.rsplit(":")[-1]], cwd=where, **quiet)]
+    try:
+        wait_for(lambda: answers(address))
+        if workers:
+            sizes = ["--nworkers", str(workers), "--nthreads", str(threads)]
+            processes.append(subprocess.Popen([*dask, "worker", address, *plain, *sizes], cwd=where, **quiet))
+            wait_for(lambda: count_workers(address) == workers)
+        yield address
+    finally:
+        for process in reversed(processes):
+            process.terminate()
+        for process in processes:
+            process.wait(timeout=20)
+
+
+def answers(address):
+    with socket.socket() as probe:
+        return probe.connect_ex(("127.0.0.1", int(address.rsplit(":")[-1]))) == 0
+
+
+def count_workers(address):
+    from distributed import Client
+
+    with Client(address, timeout=START_S) as client:
+        return len(client.nthreads())
+
+
+def wait_for(condition):
+    deadline = time.monotonic() + START_S
+    while not condition():
+        assert time.monotonic() < deadline
+        time.sleep(0.1)
+
+
+@pytest.fixture
+def world(tmp_path):
+    return write_world(tmp_path)
+
+
+@pytest.mark.filterwarnings("default")  # what distributed warns of is its own affair
+def test_a_cluster_plays_what_this_machine_plays(world, tmp_path):
+    trials = [short_trial(world), short_trial(world, name="hg-dagger", lira=None)]
+    with cluster(workers=2) as address:
+        there = run_trials(trials, tmp_path / "there", Cluster(address))
+    here = run_trials(trials, tmp_path / "here", Here(1))
+    assert [timeless(each) for each in there] == [timeless(each) for each in here]
+    assert run_trials(trials, tmp_path / "there", nothing) == there
+
+
+@pytest.mark.filterwarnings("default")
+@pytest.mark.parametrize(("workers", "threads", "wrong"), [(0, 1, "no worker"), (1, 2, "more than one thread")])
+def test_a_cluster_that_would_play_otherwise_is_refused(world, tmp_path, workers, threads, wrong):
+    with cluster(workers=workers, threads=threads) as address, pytest.raises(ConfigError, match=wrong) as refused:
+        run_trials([short_trial(world)], tmp_path, Cluster(address))
+    assert "dask worker" in refused.value.remedy
+
+
+@pytest.mark.filterwarnings("default")
+def test_a_cluster_that_is_not_there_is_named(monkeypatch, tmp_path, capsys):
+    monkeypatch.setattr("tools.experiments.pools.PATIENCE_S", 0.5)
+    address = f"tcp://127.0.0.1:{free_port()}"
+    assert main(["experiment", "tableC1", "--seeds", "1", "--run", str(tmp_path), "--scheduler", address]) == 2
+    assert "no Dask scheduler answers" in capsys.readouterr().err
+
+
+def test_an_outcome_of_other_code_is_played_again_and_says_so(world, tmp_path, capsys):
+    trial = short_trial(world)
+    (first,) = run_trials([trial], tmp_path, Here(1))
+    assert first.fingerprint
+    keep(msgspec.structs.replace(first, fingerprint="0" * 16, labels={}), tmp_path)
+    (second,) = run_trials([trial], tmp_path, Here(1))
+    assert "1 kept trials are of other code" in capsys.readouterr().err
+    assert timeless(second) == timeless(first)
+    assert kept(trial, tmp_path) == second
+
+
+def test_a_run_that_is_stopped_half_way_goes_on_where_it_was(world, tmp_path):
+    trials = [short_trial(world), short_trial(world, name="hg-dagger", lira=None)]
+
+    def stopped(missing):
+        yield play(missing[0])
+        raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        run_trials(trials, tmp_path, stopped)
+    asked = []
+
+    def going_on(missing):
+        asked.extend(missing)
+        yield from map(play, missing)
+
+    outcomes = run_trials(trials, tmp_path, going_on)
+    assert asked == trials[1:]
+    assert [each.trial for each in outcomes] == trials
+
+
+@pytest.mark.parametrize("terminal", [True, False])
+def test_progress_is_a_bar_on_a_terminal_and_lines_elsewhere(terminal):
+    script = (
+        "import sys; sys.path.insert(0, 'tests/tools')\n"
+        "from made_up_outcomes import HOLD, outcome\n"
+        "from tools.experiments.runner import Bar\n"
+        "with Bar(3, 1) as bar:\n"
+        "    bar.note(outcome(HOLD, 7))\n"
+    )
+    ours, theirs = os.openpty() if terminal else os.pipe()
+    if terminal:
+        termios.tcsetwinsize(theirs, (24, 120))
+    where = Path(__file__).parents[2]
+    try:
+        subprocess.run([sys.executable, "-c", script], stderr=theirs, cwd=where, check=True, timeout=60)
+        os.set_blocking(ours, False)
+        pieces = []
+        with suppress(BlockingIOError):
+            while True:
+                pieces.append(os.read(ours, 10_000))
+        shown = b"".join(pieces).decode()
+    finally:
+        os.close(ours)
+        os.close(theirs)
+    assert f"[2/3] race {HOLD} scripted seed 7: converged after 2 laps, 40 human labels" in shown
+    assert ("| 2/3 [" in shown) is terminal
+
+
+def test_the_fingerprint_follows_the_world_and_the_experts(world, monkeypatch, tmp_path):
+    before = fingerprint(world)
+    fingerprint.cache_clear()
+    assert fingerprint(world) == before
+    text = Path(world).read_text()
+    Path(world).write_text(text.replace("x_m = 8.0", "x_m = 8.1"))
+    fingerprint.cache_clear()
+    assert fingerprint(world) != before
+    Path(world).write_text("# a comment\n" + text)
+    expert = tmp_path / "expert"
+    shutil.copy(fingerprints.shipped_path("lidar", fingerprints.load_profile("thesis-sim")), expert)
+    fingerprint.cache_clear()
+    assert fingerprint(world) == before
+    expert.write_bytes(expert.read_bytes() + b"0")
+    monkeypatch.setattr(fingerprints, "shipped_path", lambda *_: expert)
+    fingerprint.cache_clear()
+    assert fingerprint(world) != before
+    fingerprint.cache_clear()
+
+
+def test_the_fingerprint_covers_what_a_trial_runs_and_nothing_beside_it():
+    names = {str(path.relative_to(fingerprints.ROOT)) for path in sources(fingerprints.START)}
+    assert {"fusion/lira.py", "fusion/hg_dagger.py", "fusion/teacher.py", "sim_backend/twin.py"} <= names
+    assert {"hal/governor.py", "tools/assembly.py", "tools/experiments/trial.py"} <= names
+    assert not {"fusion/service.py", "tools/experiments/runner.py", "tools/cli.py"} & names
+
+
+def test_comments_and_docstrings_do_not_count_as_code(tmp_path):
+    path = tmp_path / "module.py"
+    path.write_text('"""One."""\ndef f(x):\n    """Two."""\n    return x + 1  # why\n')
+    before = code(path)
+    path.write_text('"""Other."""\n\ndef f(x):\n    return x + 1\n')
+    assert code(path) == before
+    path.write_text("def f(x):\n    return x + 2\n")
+    assert code(path) != before
+    path.write_text("import hal.port\nfrom fusion import lira\n")
+    assert imported(path) == ["hal.port", "fusion", "fusion.lira"]

@@ -1,0 +1,31 @@
+"""Trials of one seed are pairs: ratios of what two methods, or two teachers, took, with 95 % intervals."""
+
+from collections.abc import Sequence
+
+from tools.experiments.experiment import Row
+from tools.experiments.statistics import median_interval, paired_ratios
+from tools.experiments.trial import Outcome
+
+
+def ratio(numerator: Sequence[Outcome], denominator: Sequence[Outcome], quantity: str) -> Row:
+    """One quantity of the results over another's: columns `median`, `low`, `high`, `n`, `censored`.
+
+    Both are in the order of the same seeds. `censored` counts pairs in which either run met its cap: where that is the
+    numerator's, the true ratio is larger.
+    """
+    values = paired_ratios(*([getattr(each.result, quantity) for each in group] for group in (numerator, denominator)))
+    median, low, high = median_interval(values)
+    pairs = zip(numerator, denominator, strict=True)
+    censored = sum(not (a.result.converged and b.result.converged) for a, b in pairs)
+    return {"median": median, "low": low, "high": high, "n": len(values), "censored": censored}
+
+
+def bounds(row: Row) -> tuple[float, float]:
+    """Ends of a ratio's interval."""
+    return float(str(row["low"])), float(str(row["high"]))
+
+
+def words(row: Row) -> str:
+    """A ratio in words."""
+    low, high = bounds(row)
+    return f"{row['median']:.2f} [{low:.2f}, {high:.2f}], n {row['n']}, {row['censored']} censored"

@@ -1,0 +1,66 @@
+"""What is kept of an experiment in the repository: a small JSON file, from which RESULTS.md is made."""
+
+from collections.abc import Sequence
+from pathlib import Path
+
+import msgspec
+
+from hal.errors import StorageError
+from tools.experiments.experiment import Experiment, Finding, Outcomes, Row, Table
+
+
+class Summary(msgspec.Struct, frozen=True):
+    """An experiment's numbers. `results` are the rows of its first table, `ratios` empty where nothing is paired.
+
+    `fingerprints` says with which code and experts the trials were played, one entry if they are all alike.
+    """
+
+    name: str
+    words: str
+    command: str
+    seeds: int
+    trials: int
+    machine_s: float
+    fingerprints: list[str]
+    results: list[Row]
+    ratios: list[Row]
+    tables: list[Table]
+    findings: list[Finding]
+
+
+def summarise(name: str, words: str, command: str, seeds: int, experiment: Experiment, outcomes: Outcomes) -> Summary:
+    """Reduce outcomes to what is kept."""
+    tables = experiment.tables(outcomes)
+    return Summary(
+        name=name,
+        words=words,
+        command=command,
+        seeds=seeds,
+        trials=len(outcomes),
+        machine_s=round(sum(outcome.result.elapsed_s for outcome in outcomes), 1),
+        fingerprints=sorted({outcome.fingerprint for outcome in outcomes}),
+        results=tables[0].rows,
+        ratios=experiment.ratios(outcomes),
+        tables=tables,
+        findings=experiment.findings(outcomes),
+    )
+
+
+def to_json(summary: Summary) -> str:
+    """Write it in a form that differs little from run to run: one field per line."""
+    return msgspec.json.format(msgspec.json.encode(summary), indent=2).decode()
+
+
+def read_summary(path: Path) -> Summary:
+    """Read what `to_json` wrote. Raises `StorageError`."""
+    try:
+        return msgspec.json.decode(path.read_bytes(), type=Summary)
+    except (OSError, msgspec.MsgspecError) as error:
+        raise StorageError(
+            f"{path} is not the summary of an experiment: {error}", "Make it again with 'lira experiment'."
+        ) from error
+
+
+def read_summaries(folder: Path, names: Sequence[str]) -> list[Summary]:
+    """Read those of the named experiments that the folder has, in the order of the names."""
+    return [read_summary(path) for path in (folder / f"{name}.json" for name in names) if path.exists()]

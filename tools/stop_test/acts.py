@@ -1,0 +1,171 @@
+"""How faults are made and mended: each act does something to the bench on which a robot drives."""
+
+import resource
+import signal
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Protocol
+
+from hal.bus import Bus
+from hal.errors import LiraError
+from hal.estop import press_estop, release_estop
+from tools.processes import ChildProcess
+from tools.relay import LinkFaults, Relay
+from tools.stop_test.intruder import Intruder
+
+LEASE_GONE_S = 1.2
+HOUR_S = 3600
+
+
+class StopTestError(LiraError):
+    """What is under test did not do what has to come before a fault, or with it."""
+
+
+class Bench(Protocol):
+    """What a fault may touch."""
+
+    relay: Relay
+    observer: Bus
+    intruder: Intruder
+
+    @property
+    def driver(self) -> ChildProcess:
+        """The commander under test."""
+
+    @property
+    def robot(self) -> ChildProcess:
+        """The robot's process."""
+
+    @property
+    def link(self) -> ChildProcess:
+        """The process in the link."""
+
+    @property
+    def run_folder(self) -> Path:
+        """Where a commander that learns writes."""
+
+    def restart_robot(self) -> None:
+        """Start the robot's process again."""
+
+    def restart_link(self) -> None:
+        """Start the process in the link again."""
+
+    def tell_driver(self, word: str) -> None:
+        """Say a word to the commander under test."""
+
+    def tell_robot(self, word: str) -> None:
+        """Say a word to the robot's devices."""
+
+    def set_clock(self, who: str, offset_s: int) -> None:
+        """Set the time of day of "robot" or "driver" so much ahead of the true one."""
+
+    def reset_clock(self, who: str) -> None:
+        """Set it right."""
+
+
+Act = Callable[[Bench], None]
+
+
+def nothing(bench: Bench) -> None:
+    """Mend by waiting."""
+
+
+def driver_signal(number: signal.Signals) -> Act:
+    """Send the commander a signal."""
+    return lambda bench: bench.driver.signal(number)
+
+
+def robot_signal(number: signal.Signals) -> Act:
+    """Send the robot's process a signal."""
+    return lambda bench: bench.robot.signal(number)
+
+
+def driver_word(word: str) -> Act:
+    """Say a word to the commander."""
+    return lambda bench: bench.tell_driver(word)
+
+
+def robot_word(word: str) -> Act:
+    """Say a word to the robot's devices."""
+    return lambda bench: bench.tell_robot(word)
+
+
+def put(payload: bytes) -> Act:
+    """Put bytes on `cmd_vel`, again and again."""
+    return lambda bench: bench.intruder.put_raw(payload)
+
+
+def link(**faults: float | bool) -> Act:
+    """Make the link bad."""
+
+    def change(bench: Bench) -> None:
+        for name, value in faults.items():
+            setattr(bench.relay.faults, name, value)
+
+    return change
+
+
+def mend_link(bench: Bench) -> None:
+    """Make the link good."""
+    link(**{name: getattr(LinkFaults(), name) for name in LinkFaults.__dataclass_fields__})(bench)
+
+
+def cut_link(bench: Bench) -> None:
+    """Break what is connected, and let nothing through."""
+    bench.relay.faults.dark = True
+    bench.relay.cut()
+
+
+def kill_link(bench: Bench) -> None:
+    """Kill -9 the process in the link."""
+    bench.link.signal(signal.SIGKILL)
+
+
+def restart_link(bench: Bench) -> None:
+    """Start it again."""
+    bench.restart_link()
+
+
+def restart_robot(bench: Bench) -> None:
+    """Start the robot's process again."""
+    bench.restart_robot()
+
+
+def lose_the_lease(bench: Bench) -> None:
+    """Freeze the commander until its lease is over, and give that to somebody else."""
+    bench.driver.signal(signal.SIGSTOP)
+    time.sleep(LEASE_GONE_S)
+    bench.intruder.take_lease()
+
+
+def fill_disk(bench: Bench) -> None:
+    """Let no file of the commander grow any more, as on a full disk: neither labels nor record."""
+    biggest = max(path.stat().st_size for path in bench.run_folder.iterdir())
+    resource.prlimit(bench.driver.pid, resource.RLIMIT_FSIZE, (biggest, biggest))
+
+
+def see_it_told(bench: Bench) -> None:
+    """Look whether the commander said that it could not write. Raises `StopTestError` if not."""
+    if "cannot write" not in bench.driver.output():
+        raise StopTestError("the learner kept quiet about a full disk", f"It wrote:\n{bench.driver.tail()}")
+
+
+def clock(who: str, offset_s: int) -> Act:
+    """Set a process's time of day."""
+    return lambda bench: bench.set_clock(who, offset_s)
+
+
+def true_clock(who: str) -> Act:
+    """Set it right."""
+    return lambda bench: bench.reset_clock(who)
+
+
+def press(bench: Bench) -> None:
+    """Press the emergency stop."""
+    press_estop(bench.observer)
+
+
+def release(bench: Bench) -> None:
+    """Release it."""
+    release_estop(bench.observer)

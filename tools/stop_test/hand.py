@@ -1,0 +1,59 @@
+"""A person's hand under test: the bridge of `lira joystick`, with a pad that is moved by word instead of by thumbs.
+
+Words: `go` grips and pushes the stick as far as it goes; `leave` lets go.
+
+python -m tools.stop_test.hand NAME HOST:PORT EAR_PORT
+"""
+
+import sys
+import threading
+import time
+
+from hal.bus import Bus
+from hal.topics import INFO
+from tools.bench.takeover import PipePad
+from tools.joystick.bridge import Bridge
+from tools.joystick.codes import AXES, BUTTONS, EV_ABS, EV_KEY
+from tools.joystick.mapping import load_mapping
+from tools.joystick.memory import PadMemory
+from tools.joystick.wheel import Wheel
+from tools.stop_test.control import Ear
+
+READY = "a hand by word"
+ANSWER_S = 5.0
+REST_S = 0.3  # with the hand on and the stick at rest, which arms the robot
+CENTRE, FORWARD = 128, 0
+
+
+def main(name: str, endpoint: str, ear_port: int) -> None:
+    """Drive by word."""
+    mapping, pad = load_mapping("ps3"), PipePad()
+    axis = AXES[mapping.forward.axis]
+
+    def hold(button: str, down: int) -> tuple[int, int, int]:
+        return EV_KEY, BUTTONS[button], down
+
+    def hear(word: str) -> None:
+        if word == "go":
+            pad.send((EV_ABS, axis, CENTRE), hold(mapping.dead_man, 1), hold(mapping.turbo, 1))
+            time.sleep(REST_S)
+            pad.send((EV_ABS, axis, FORWARD))
+        elif word == "leave":
+            pad.send((EV_ABS, axis, CENTRE), hold(mapping.dead_man, 0))
+
+    bus = Bus(name, connect=endpoint)
+    bus.ask(INFO)
+    watch = Bus(name, connect=endpoint, watch=True)
+    wheel = Wheel(bus, watch, ANSWER_S)
+    bridge = Bridge(mapping, wheel, lambda: pad, PadMemory(None))
+    Ear(ear_port, hear)
+    print(READY, flush=True)
+    try:
+        bridge.run(threading.Event())
+    finally:
+        for session in (bus, watch):
+            session.close()
+
+
+if __name__ == "__main__":
+    main(sys.argv[1], sys.argv[2], int(sys.argv[3]))
