@@ -46,7 +46,7 @@ class Hand:
     def __init__(self, *script):
         self.script, self.policies = list(script), []
 
-    def act(self, state, proposal, policy):
+    def act(self, state, proposal, policy, offers):
         self.policies.append(policy)
         return self.script.pop(0)
 

@@ -15,9 +15,10 @@ STATE = CourseState(2.0, 1.0, 0.5, 0.1, 0.9, 0.2, 1.1, float("nan"), clearance_m
 VIEWS = (ExpertView("camera", (1.0, 0.1), 0.3, True), ExpertView("lidar", (1.0, 0.0), 0.0, False))
 
 
-def step(driver="novice", *, label=None, stored=False, call=Call.NONE, state=STATE):
+def step(driver="novice", *, proposed=None, label=None, stored=False, call=Call.NONE, state=STATE):
     action = label or (0.8, 0.1)
-    proposal = Proposal(FEATURES, Choice(driver, action, call=call), novice=(0.7, 0.0), experts=VIEWS, threshold=0.06)
+    wish = Choice(proposed or driver, action, call=call)
+    proposal = Proposal(FEATURES, wish, novice=(0.7, 0.0), experts=VIEWS, threshold=0.06)
     lesson = Lesson(Choice(driver, action, label=label, call=call), stored)
     return Step(Observation(17, 2.0), proposal, Applied(STOP, 2.0), lesson, state)
 
@@ -63,7 +64,8 @@ def test_a_step_without_a_label_keeps_none(desk):
 
 
 def test_the_decision_says_who_drives_and_why(desk):
-    decision = desk.note(step("human", label=(0.2, 1.0), stored=True, call=Call.FEEDBACK))["decision"]
+    taken = step("human", proposed="novice", label=(0.2, 1.0), stored=True, call=Call.FEEDBACK)
+    decision = desk.note(taken)["decision"]
     assert (decision.stamp_s, decision.observation, decision.phase, decision.lap) == (2.0, 17, "train", 2)
     assert (decision.driver, decision.call, decision.threshold) == ("human", "feedback", 0.06)
     assert decision.executed == decision.human == (0.2, 1.0)

@@ -1,9 +1,11 @@
 """What the ledger counts beside labels: a script of steps, counted by hand."""
 
+from dataclasses import replace
+
 import pytest
 
 from fusion.ledger import Account, Ledger
-from fusion.method import Call, Choice, Lesson
+from fusion.method import Call, Choice, Lesson, Proposal, Settled
 
 PERIOD_S = 0.2
 SCRIPT = {
@@ -15,13 +17,13 @@ SCRIPT = {
 }
 
 
-def after(script, *, trained=True):
+def after(script, *, demonstrating=False):
     ledger = Ledger()
     for k, step in enumerate(script):
         if step == "|":
             ledger.new_episode()
         else:
-            ledger.note(SCRIPT[step], now_s=k * PERIOD_S, trained=trained)
+            ledger.note(SCRIPT[step], now_s=k * PERIOD_S, demonstrating=demonstrating)
     return ledger
 
 
@@ -34,7 +36,7 @@ def test_steps_are_counted_by_what_happened_in_them():
 
 
 def test_the_demonstration_is_only_counted_as_labels():
-    account = after("hhi", trained=False).account
+    account = after("hhi", demonstrating=True).account
     assert account == Account(given={"demonstration": 3}, stored={"demonstration": 2})
 
 
@@ -67,3 +69,25 @@ def test_a_call_counts_by_its_kind_and_an_episode_does_not():
 def test_a_switch_is_a_change_of_the_driver_within_one_episode():
     assert after("..a.h").account.switches == 3
     assert after("..|a").account.switches == 0
+
+
+def test_to_give_the_wheel_is_one_intervention_and_one_label_however_long_the_expert_keeps_it():
+    ledger = Ledger()
+    first = Lesson(Choice("lidar", (1.0, 0.3), label=(1.0, 0.3), given=1), reserved=True)
+    second = Lesson(replace(first.choice, driver="camera", given=2), reserved=True)
+    for k, step in enumerate([SCRIPT["f"], first, first, SCRIPT["."], second, second]):
+        ledger.note(step, now_s=k * PERIOD_S, demonstrating=False)
+    assert ledger.interventions == 2
+    assert (ledger.labels.given_human, ledger.labels.stored_human) == (2, 2)
+    assert ledger.buffer == 0  # nothing is settled yet
+    assert ledger.account.answered == 1
+
+
+def test_a_reserved_label_is_stored_when_it_is_settled():
+    ledger = Ledger()
+    choice = SCRIPT["a"].choice
+    reserved = Lesson(choice, reserved=True)
+    settled = tuple(Settled(Proposal(None, choice), stored=stored) for stored in (True, False))
+    for k, step in enumerate([reserved, reserved, Lesson(SCRIPT["."].choice, settled=settled)]):
+        ledger.note(step, now_s=k * PERIOD_S, demonstrating=False)
+    assert (ledger.account.given, ledger.account.stored) == ({"camera": 2}, {"camera": 1})

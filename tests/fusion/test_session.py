@@ -101,7 +101,7 @@ class Hand:
         self.left = self.steps
         self.layouts.append(layout)
 
-    def act(self, state, proposal, policy):
+    def act(self, state, proposal, policy, offers):
         self.left -= 1
         return (1.0, 0.0) if self.left >= 0 else None
 

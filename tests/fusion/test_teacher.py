@@ -168,7 +168,7 @@ WORLD = World(
         (0.0, 0.0, straight, False),
         (0.6, 0.0, straight, True),  # beside the line, with nothing to drive around
         (0.3, 0.0, straight, False),
-        (0.0, 0.0, lambda features: (0.1, 0.0), True),  # nothing will happen to it, and nothing will come of it
+        (0.0, 0.0, lambda _: (0.1, 0.0), True),  # nothing will happen to it, and nothing will come of it
     ],
 )
 def test_a_robot_that_strays_from_a_free_line_or_stands_is_in_need_of_help(lateral_m, yaw_rad, policy, wheel):
