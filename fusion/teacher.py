@@ -87,7 +87,7 @@ class ScriptedTeacher:
         danger = self._danger(state, proposal, policy)
         if self._driving:
             self._safe = 0 if danger else self._safe + 1
-            self._driving = self._safe < self._settings.safe_steps
+            self._driving = self._safe < self._settings.safe_steps and not proposal.relieves
         elif self._reacts(state.stamp_s, danger, called=proposal.choice.call is not Call.NONE):
             self._take_over()
         if not self._driving:
