@@ -10,7 +10,7 @@ from made_up_outcomes import HOLD, lap, outcome
 from fusion.ledger import Account
 from hal.errors import StorageError
 from tools.cli import main
-from tools.experiments import compare, densities, document, faults, thresholds, trajectories
+from tools.experiments import compare, densities, document, faults, sharing, thresholds, trajectories
 from tools.experiments.experiment import Finding, Picture
 from tools.experiments.measures import driving_row, effort_row, label_row
 from tools.experiments.page import write_page
@@ -146,6 +146,23 @@ def test_what_a_fault_costs_is_paired_with_the_perfect_teacher():
         changed = [name for name, value in msgspec.structs.asdict(faults.alone(fault)).items()
                    if value != getattr(faults.PERFECT, name)]  # fmt: skip
         assert sorted(changed) == sorted(names)
+
+
+def test_table_d1_sets_fixed_over_flexible():
+    taken = {"hold": (40, 8), "hold-fixed": (30, 20), "hold-flexible": (60, 10)}
+    outcomes = [
+        outcome(name.replace("hold", preset), seed, labels=labels, interventions=interventions)
+        for preset in sharing.PRESETS
+        for name, (labels, interventions) in taken.items()
+        for seed in range(3)
+    ]
+    medians = {(row["method"], row["quantity"]): row["median"] for row in sharing.ratios(outcomes)}
+    assert medians["hold-flexible", "human_labels"] == 0.5
+    assert medians["thesis-flexible", "interventions"] == 2.0
+    found = {finding.key: finding.agrees for finding in sharing.findings(outcomes)}
+    assert found["tableD1.hold-flexible.human_labels"]
+    assert found["tableD1.hold-flexible.interventions"]
+    assert not found["tableD1.hold-flexible.buffer"]  # both 90: on no side of 1
 
 
 def test_every_experiment_in_the_registry_can_be_loaded_and_lists_trials_for_its_seeds():

@@ -6,7 +6,7 @@ from functools import partial
 from fusion.tasks import task_of
 from tools.experiments.experiment import Experiment, Finding, Outcomes, Picture, Row, Table
 from tools.experiments.measures import by_method, driving_row, effort_row, expert_labels, label_row
-from tools.experiments.methods import HG_DAGGER, LIRA
+from tools.experiments.methods import FLOORS, HG_DAGGER, LIRA
 from tools.experiments.pairs import bounds, ratio, words
 from tools.experiments.pictures import box_pictures, spelt
 from tools.experiments.trial import Trial
@@ -40,7 +40,7 @@ THESIS_RATIOS = {"human_labels": 156.5 / 59, "interventions": 19.5 / 9.5}
 
 def trials(seeds: int, world: str) -> list[Trial]:
     """Every method on every seed."""
-    return [Trial(method, world, seed) for method in (*LIRA, *HG_DAGGER) for seed in range(seeds)]
+    return [Trial(method, world, seed) for method in (*LIRA, *HG_DAGGER, *FLOORS) for seed in range(seeds)]
 
 
 def summary(outcomes: Outcomes) -> list[Row]:
@@ -132,7 +132,7 @@ EXPERIMENTS = {
         findings=partial(findings, name=name),
         figures=figures,
         ratios=ratios,
-        methods=tuple(method.name for method in (*LIRA, *HG_DAGGER)),
+        methods=tuple(method.name for method in (*LIRA, *HG_DAGGER, *FLOORS)),
     )
     for name, world, thesis in (("table2", "line-obstacles", THESIS), ("race", "race", []))
 }

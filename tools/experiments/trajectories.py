@@ -66,7 +66,7 @@ def figures(outcomes: Outcomes) -> list[Picture]:
     tracks = {method: track for method, first in firsts.items() if (track := final(first)) is not None}
     trial = outcomes[0].trial
     words = f"Final novices on layout {trial.seed}; the colour is the speed, a dot a decision (thesis, E.6)"
-    return [Picture("drives", words, partial(plots.top_view, trial.world, tracks, trial.max_linear_m_s))]
+    return [Picture("drives", words, partial(plots.top_view, trial.world, tracks, trial.profile.base.max_linear_m_s))]
 
 
 EXPERIMENTS = {

@@ -10,17 +10,17 @@ from fusion.journal import Journal
 from fusion.presets import Method as Method
 from fusion.record import LapRecord, ResultRecord
 from fusion.session import Session
+from fusion.tasks import TASKS, task_of
 from fusion.teacher import SKILLED, TeacherSettings
 from fusion.trainer import InlineTrainer
 from hal.governed import GovernedRobot
 from hal.messages import Action
-from hal.profile import load_profile
+from hal.profile import RobotProfile, load_profile
 from sim_backend.catalogue import load_world
 from sim_backend.twin import Twin
 from tools.assembly import crew, lap, teacher
 from tools.experiments.notes import Notes, Track
 
-PROFILE = "thesis-sim"
 UNSEEN = 1000  # layouts from here on belong to nobody's training
 
 
@@ -35,7 +35,22 @@ class Trial(msgspec.Struct, frozen=True):
     laps: int = 12
     all_laps: bool = False  # go on after the novice has passed
     unseen: int = 3
-    max_linear_m_s: float = 1.0
+    max_linear_m_s: float | None = None  # None: as fast as the robot goes
+    experts: str | None = None  # a pair, as in `fusion.expert_files`; None: those of the world's task
+
+    @property
+    def pair(self) -> str:
+        """Whose experts take part."""
+        return self.experts or task_of(self.world)
+
+    @property
+    def profile(self) -> RobotProfile:
+        """The robot of the world's task, at this trial's full speed."""
+        profile = load_profile(TASKS[task_of(self.world)].profile)
+        if self.max_linear_m_s is None:
+            return profile
+        base = msgspec.structs.replace(profile.base, max_linear_m_s=self.max_linear_m_s)
+        return msgspec.structs.replace(profile, base=base)
 
     @property
     def file(self) -> str:
@@ -68,14 +83,12 @@ def play(trial: Trial) -> Outcome:
     import torch
 
     torch.set_num_threads(1)
-    profile, world = load_profile(PROFILE), load_world(trial.world)
-    base = msgspec.structs.replace(profile.base, max_linear_m_s=trial.max_linear_m_s)
-    profile = msgspec.structs.replace(profile, base=base)
+    profile, world = trial.profile, load_world(trial.world)
     notes = Notes()
     twin = Twin(profile, world, layout=trial.seed, seed=trial.seed, renderer="tiny")
     robot = GovernedRobot(twin)
     robot.open()
-    team = crew(trial.method, profile, trial.seed, InlineTrainer)
+    team = crew(trial.method, profile, trial.seed, InlineTrainer, trial.pair)
     try:
         loop = ControlLoop(robot, truth=twin.state)
         session = Session(robot, twin, loop, Journal(keep=notes.label, write=notes.record), team.pupil, team.alone)
