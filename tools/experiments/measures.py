@@ -26,6 +26,11 @@ def by_method(outcomes: Outcomes) -> dict[str, list[Outcome]]:
     return grouped(outcomes, lambda outcome: outcome.trial.method.name)
 
 
+def method_rows(outcomes: Outcomes, row: Callable[[Sequence[Outcome]], Row]) -> list[Row]:
+    """One row per method."""
+    return [{"method": method} | row(group) for method, group in by_method(outcomes).items()]
+
+
 def label_row(group: Sequence[Outcome]) -> Row:
     """The columns of Table II, medians over the seeds, with means and interquartile means of what is compared."""
     first = [outcome.after(1) for outcome in group]

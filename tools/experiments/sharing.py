@@ -2,7 +2,7 @@
 
 from fusion.presets import METHODS
 from tools.experiments.experiment import Experiment, Finding, Outcomes, Picture, Row, Table
-from tools.experiments.measures import by_method, driving_row, effort_row, label_row
+from tools.experiments.measures import by_method, driving_row, effort_row, label_row, method_rows
 from tools.experiments.pairs import bounds, ratio, words
 from tools.experiments.pictures import box_pictures, spelt
 from tools.experiments.trial import Trial
@@ -37,14 +37,13 @@ def ratios(outcomes: Outcomes) -> list[Row]:
 
 def tables(outcomes: Outcomes) -> list[Table]:
     """The settings beside the thesis's."""
-    groups = by_method(outcomes)
-    ours: list[Row] = [{"method": name} | label_row(group) for name, group in groups.items()]
+    ours: list[Row] = method_rows(outcomes, label_row)
     thesis: list[Row] = [{"method": f"thesis: {when}", "n": 10} | dict(row) for when, row in THESIS.items()]
     return [
         Table("Labels and interventions until the novice passed its proving run", [*ours, *thesis]),
         Table("Fixed over flexible, by pairs of one seed", ratios(outcomes)),
-        Table("Calls and the human's time", [{"method": name} | effort_row(group) for name, group in groups.items()]),
-        Table("Driving", [{"method": name} | driving_row(group) for name, group in groups.items()]),
+        Table("Calls and the human's time", method_rows(outcomes, effort_row)),
+        Table("Driving", method_rows(outcomes, driving_row)),
     ]
 
 
