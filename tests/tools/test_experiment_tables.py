@@ -12,7 +12,7 @@ from hal.errors import StorageError
 from tools.cli import main
 from tools.experiments import compare, densities, document, faults, sharing, thresholds, trajectories
 from tools.experiments.experiment import Finding, Picture
-from tools.experiments.measures import driving_row, effort_row, label_row
+from tools.experiments.measures import driving_row, effort_row, label_row, source_rows
 from tools.experiments.page import write_page
 from tools.experiments.registry import REGISTRY, load
 from tools.experiments.summary import read_summary, summarise, to_json
@@ -41,6 +41,15 @@ def test_the_humans_time_is_steps_at_five_hertz_and_the_experts_labels_are_those
     assert row["human_time_s"] == pytest.approx(10.0)
     assert row["human_total"] == 70
     assert row["with_experts"] > row["human_total"]
+
+
+def test_labels_are_counted_by_source():
+    accounts = [Account(given={"human": 10, "mean": 4}, stored={"human": 9, "mean": 1}), Account(given={"human": 20})]
+    rows = source_rows([outcome(HOLD, seed, account=each) for seed, each in enumerate(accounts)])
+    assert rows == [
+        {"method": HOLD, "source": "human", "given": 15.0, "stored": 4.5},
+        {"method": HOLD, "source": "mean", "given": 2.0, "stored": 0.5},
+    ]
 
 
 def test_only_laps_driven_to_the_end_have_a_time_to_finish():
@@ -255,7 +264,7 @@ def test_some_methods_may_be_played_alone(capsys, tmp_path):
     alone = [each for each in compared(3) if each.trial.method.name == HOLD]
     race = load("race")
     assert race.ratios(alone) == []
-    assert [len(table.rows) for table in race.tables(alone)] == [1, 1, 1]
+    assert [len(table.rows) for table in race.tables(alone)] == [1, 1, 1, 1]
     assert [picture.name for picture in race.figures(alone)] == ["human_labels", "interventions"]
     where = ["--run", str(tmp_path), "--methods", f"{HOLD},hg"]
     assert main(["experiment", "race", *where]) == 2

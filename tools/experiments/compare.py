@@ -5,7 +5,15 @@ from functools import partial
 
 from fusion.tasks import task_of
 from tools.experiments.experiment import Experiment, Finding, Outcomes, Picture, Row, Table
-from tools.experiments.measures import by_method, driving_row, effort_row, expert_labels, label_row, method_rows
+from tools.experiments.measures import (
+    by_method,
+    driving_row,
+    effort_row,
+    expert_labels,
+    label_row,
+    method_rows,
+    source_rows,
+)
 from tools.experiments.methods import FLOORS, HG_DAGGER, LIRA
 from tools.experiments.pairs import bounds, ratio, words
 from tools.experiments.pictures import box_pictures, spelt
@@ -92,6 +100,7 @@ def tables(outcomes: Outcomes, thesis: Sequence[Row]) -> list[Table]:
         Table("Labels and interventions until the novice passed its proving run", [*summary(outcomes), *thesis]),
         Table("HG-DAgger over LIRA-SPF, by pairs of one seed", ratios(outcomes), f"Thesis, Table II: {theirs}."),
         Table("Calls and the human's time", method_rows(outcomes, effort_row)),
+        Table("Labels by source", source_rows(outcomes), "Given, and stored in the buffer; the rest was redundant."),
         Table("Driving", method_rows(outcomes, driving_row)),
         Table("Labels that trained the experts, paid back", amortised(outcomes), "Labels are medians over the seeds."),
     ]

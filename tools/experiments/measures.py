@@ -81,6 +81,18 @@ def effort_row(group: Sequence[Outcome]) -> Row:
     }
 
 
+def source_rows(outcomes: Outcomes) -> list[Row]:
+    """Labels given and stored by each source of each method; medians over the seeds."""
+    rows: list[Row] = []
+    for method, group in by_method(outcomes).items():
+        accounts = [outcome.result.account for outcome in group]
+        for source in dict.fromkeys(source for each in accounts for source in each.given):
+            given = median([each.given.get(source, 0) for each in accounts])
+            stored = median([each.stored.get(source, 0) for each in accounts])
+            rows.append({"method": method, "source": source, "given": given, "stored": stored})
+    return rows
+
+
 def driving_row(group: Sequence[Outcome]) -> Row:
     """How it was driven: collisions while it was taught, and how the novice drives layouts it has not seen."""
     taught = [lap for outcome in group for lap in outcome.laps if lap.phase == "train"]
