@@ -1,19 +1,42 @@
-"""HG-DAgger (Kelly et al., 2019), training phase: the human gates, and only what the human drives is learned."""
+"""HG-DAgger (Kelly et al., 2019): the human gates, and only what the human drives is learned.
 
+At test time the novice may doubt: `fusion/doubt.py`.
+"""
+
+from typing import Literal
+
+from fusion.doubt import DoubtLog
 from fusion.method import STAND, Call, Choice, Lesson, Policy, Proposal
 from fusion.novice import Novice
 from fusion.preprocess import Features
+from hal.config import Table
 from hal.messages import Action
 
 
-class HgDagger:
-    """The novice drives; the human takes the wheel when the novice errs. It also trains the experts."""
+class HgDaggerSettings(Table, frozen=True, tag="hg-dagger"):
+    """In which runs the novice, driving alone, stops when it is in doubt, and how many policies it asks about that.
 
-    def __init__(self, novice: Novice) -> None:
+    Without any there is no ensemble. With one the novice learns what it learns without.
+    """
+
+    doubt: tuple[Literal["prove", "unseen"], ...] = ()
+    ensemble: int = 5
+
+
+class HgDagger:
+    """The novice drives; the human takes the wheel when the novice errs. It also trains the experts.
+
+    `log`, if there is one, notes how much the novice doubted whenever the human took over.
+    """
+
+    def __init__(self, novice: Novice, log: DoubtLog | None = None) -> None:
         self.novice = novice
+        self.log = log
+        self.reset()
 
     def reset(self) -> None:
-        """Nothing belongs to an episode."""
+        """Nobody holds the wheel when an episode begins."""
+        self._human_drove = False
 
     def update(self, now_s: float) -> None:
         """Train, and adopt what training has brought."""
@@ -28,8 +51,12 @@ class HgDagger:
 
     def learn(self, proposal: Proposal, human: Action | None) -> Lesson:
         """Store the human's action, unless it is an idle frame that is to be left out."""
+        taken_over = human is not None and not self._human_drove
+        self._human_drove = human is not None
         if human is None:
             return Lesson(proposal.choice)
+        if taken_over and self.log is not None and self.novice.trained:
+            self.log.take_over(proposal.features)
         if self.novice.leaves_out(human):
             return Lesson(Choice("human", human))
         stored = self.novice.learn(proposal.features, human, "human", proposal.novice)

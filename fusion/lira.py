@@ -21,7 +21,7 @@ from hal.config import Table
 from hal.messages import Action, ExpertView
 
 
-class LiraSettings(Table, frozen=True):
+class LiraSettings(Table, frozen=True, tag="lira"):
     """The thresholds, as fractions of the action range, and what the thesis leaves open.
 
     `hold` (not in the thesis) also counts an expert as active while its action is further than this from its cruise

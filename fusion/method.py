@@ -55,6 +55,7 @@ class Proposal:
     experts: tuple[ExpertView, ...] = ()
     threshold: float = 0.0
     speed: float = 1.0
+    relieves: bool = False  # a human who holds the wheel is asked to let go: who is proposed takes over
 
     @property
     def command(self) -> Action:

@@ -1,5 +1,7 @@
 """The novice Pi^N and its labels D^N: it acts, drops redundant labels, and trains whenever m new ones are stored."""
 
+import math
+import time
 from typing import Literal, Protocol
 
 from fusion.learner import Label, Weights
@@ -9,6 +11,7 @@ from hal.config import Table
 from hal.messages import Action
 
 REST = 1e-6  # an action within this of zero is none
+CATCH_UP_POLL_S = 0.005
 
 
 class LearningSettings(Table, frozen=True):
@@ -100,6 +103,12 @@ class Novice:
         if self._fresh >= self.settings.labels_per_step and not self._trainer.pending:
             self._fresh -= self.settings.labels_per_step
             self._trainer.start(now_s)
+
+    def catch_up(self) -> None:
+        """Run the training steps that are due, one after the other, and wait for them. The remainder is carried."""
+        while self._trainer.pending or self._fresh >= self.settings.labels_per_step:
+            self.update(math.inf)
+            time.sleep(CATCH_UP_POLL_S if self._trainer.pending else 0.0)
 
     def close(self) -> None:
         """End the training, in bounded time."""

@@ -70,7 +70,8 @@ class LapRecord(msgspec.Struct, frozen=True, tag="lap"):
     """The end of one lap. `phase` is "train", "prove" (the novice alone) or "unseen" (alone on a new layout).
 
     `human_labels` (stored), `interventions`, `calls` and `buffer` are totals of the session so far; `passed` means: to
-    the end, no collision, line never lost. `unassisted` means that no human action was needed.
+    the end, no collision, line never lost. `unassisted` means that no human action was needed. `stops` counts how often
+    a novice that drove alone stood and asked, being in doubt.
     """
 
     phase: str
@@ -88,6 +89,7 @@ class LapRecord(msgspec.Struct, frozen=True, tag="lap"):
     buffer: int
     training_steps: int
     elapsed_s: float
+    stops: int = 0
 
 
 class RunRecord(msgspec.Struct, frozen=True, tag="run"):

@@ -1,6 +1,6 @@
 """A course of teaching on a twin: laps with the teacher, a proving run after each, then layouts never seen."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from typing import Literal, Protocol
 
@@ -8,7 +8,7 @@ import numpy as np
 
 from fusion.control import HELD, ControlLoop, Step, Teacher
 from fusion.journal import Journal
-from fusion.method import Alone, Method
+from fusion.method import Alone, Call, Method
 from fusion.novice import Novice
 from fusion.record import LapRecord, ResultRecord
 from hal.errors import DeviceError
@@ -52,6 +52,7 @@ class Tally:
     collisions: int = 0
     lost: int = 0
     unfinished: int = 0
+    stops: int = 0
     lateral_m: list[float] = field(default_factory=list)
 
     @property
@@ -61,14 +62,27 @@ class Tally:
 
 
 class Session:
-    """Teaches one apprentice on one robot."""
+    """Teaches one apprentice on one robot.
 
-    def __init__(self, robot: Robot, arena: Arena, loop: ControlLoop, journal: Journal, apprentice: Apprentice) -> None:
+    `alone` says who drives in a phase without the teacher, "prove" or "unseen": the novice, if it is not given. Without
+    an apprentice there is nobody to teach, only `alone` to be shown.
+    """
+
+    def __init__(
+        self,
+        robot: Robot,
+        arena: Arena,
+        loop: ControlLoop,
+        journal: Journal,
+        apprentice: Apprentice | None,
+        alone: Callable[[str], Method] | None = None,
+    ) -> None:
         self._robot = robot
         self._arena = arena
         self._loop = loop
         self._journal = journal
         self._apprentice = apprentice
+        self._driver = alone or (lambda _: Alone("novice", self._pupil.novice.act))
         self._began_s = robot.now()
         self._laps = 0
 
@@ -78,17 +92,26 @@ class Session:
         Returns whether the last proving run was passed; False if `laps` were not enough.
         """
         proven = False
+        pupil = self._pupil
         for lap in range(1, laps + 1):
             self._laps = lap
-            self._lap(self._apprentice, drives, "train", lap, teacher)
-            proven = self._apprentice.novice.trained and self._alone(drives, "prove", lap).passed
+            self._lap(pupil, drives, "train", lap, teacher)
+            pupil.reset()  # the lap is over: who learns by laps learns now
+            proven = pupil.novice.trained and self._alone(drives, "prove", lap).passed
             if proven and not all_laps:
                 break
         return proven
 
-    def show(self, drives: Sequence[Drive]) -> list[LapRecord]:
-        """Let the frozen novice drive, each drive a lap of its own; after a crash it goes on behind it."""
-        return [self._alone([drive], "unseen", lap) for lap, drive in enumerate(drives, start=1)]
+    def prove(self, drives: Sequence[Drive]) -> bool:
+        """One proving run and no teaching. Returns whether it was passed."""
+        return self._alone(drives, "prove", 1).passed
+
+    def show(self, drives: Sequence[Drive], teacher: Teacher | None = None) -> list[LapRecord]:
+        """Let the frozen novice drive, each drive a lap of its own; after a crash it goes on behind it.
+
+        The teacher, if there is one, answers a robot that stands in doubt, and takes the wheel as it would in training.
+        """
+        return [self._alone([drive], "unseen", lap, teacher) for lap, drive in enumerate(drives, start=1)]
 
     def result(self, converged: bool) -> ResultRecord:
         """Sum the session up."""
@@ -101,14 +124,24 @@ class Session:
             interventions=ledger.interventions,
             calls=ledger.calls,
             buffer=ledger.buffer,
-            training_steps=self._apprentice.novice.training_steps,
+            training_steps=self._training_steps,
             simulated_s=self._robot.now() - self._began_s,
             elapsed_s=self._journal.elapsed_s,
             account=ledger.account,
         )
 
-    def _alone(self, drives: Sequence[Drive], phase: str, lap: int) -> LapRecord:
-        return self._lap(Alone("novice", self._apprentice.novice.act), drives, phase, lap, None)
+    @property
+    def _pupil(self) -> Apprentice:
+        if self._apprentice is None:
+            raise ValueError("there is nobody to teach")
+        return self._apprentice
+
+    @property
+    def _training_steps(self) -> int:
+        return 0 if self._apprentice is None else self._apprentice.novice.training_steps
+
+    def _alone(self, drives: Sequence[Drive], phase: str, lap: int, teacher: Teacher | None = None) -> LapRecord:
+        return self._lap(self._driver(phase), drives, phase, lap, teacher)
 
     def _lap(self, method: Method, drives: Sequence[Drive], phase: str, lap: int, teacher: Teacher | None) -> LapRecord:
         tally = Tally()
@@ -132,8 +165,9 @@ class Session:
             interventions=ledger.interventions,
             calls=ledger.calls,
             buffer=ledger.buffer,
-            training_steps=self._apprentice.novice.training_steps,
+            training_steps=self._training_steps,
             elapsed_s=self._journal.elapsed_s,
+            stops=tally.stops,
         )
         self._journal.write(record)
         return record
@@ -143,6 +177,7 @@ class Session:
         self._begin(drive.episode, method, teacher)
         end_s = self._robot.now() + drive.limit_s
         state = self._arena.state()
+        stood = False
         while not state.finished and self._robot.now() < end_s:
             step = self._step(method, teacher)
             self._journal.note(
@@ -150,10 +185,16 @@ class Session:
                 phase=phase,
                 lap=lap,
                 layout=drive.episode.layout,
-                training_steps=self._apprentice.novice.training_steps,
+                training_steps=self._training_steps,
             )
             tally.steps += 1
             tally.human_steps += step.lesson.choice.driver == "human"
+            stands = phase != "train" and step.proposal.choice.call is Call.FEEDBACK
+            tally.stops += stands and not stood
+            stood = stands
+            if stands and phase == "prove":  # nobody is there to answer
+                tally.unfinished += 1
+                return
             state = self._arena.state()
             if np.isfinite(state.lateral_m):
                 tally.lateral_m.append(state.lateral_m)

@@ -92,10 +92,8 @@ class ScriptedTeacher:
         danger = self._danger(state, proposal, policy)
         if self._driving:
             self._safe = 0 if danger else self._safe + 1
-            self._driving = self._safe < self._settings.safe_steps
-        elif self._reacts(
-            state.stamp_s, danger, alert=proposal.choice.call is not Call.NONE or proposal.choice.given > 0
-        ):
+            self._driving = self._safe < self._settings.safe_steps and not proposal.relieves
+        elif self._reacts(state.stamp_s, danger, alert=_asks(proposal)):
             name = self._pick(state, offers)
             if name is not None:
                 self._react_at_s = None
@@ -192,3 +190,8 @@ class ScriptedTeacher:
             self._wrong_steps -= 1
             angular = -angular
         return linear, max(-1.0, min(1.0, angular * self._gain))
+
+
+def _asks(proposal: Proposal) -> bool:
+    """Whether there is a reason to watch closely: a call, or an expert that was just given the wheel."""
+    return proposal.choice.call is not Call.NONE or proposal.choice.given > 0

@@ -10,14 +10,13 @@ import msgspec
 from fusion.control import ControlLoop
 from fusion.demonstrations import DemonstrationLog, read_demonstrations
 from fusion.experts import load_expert
-from fusion.hg_dagger import HgDagger
 from fusion.journal import Journal
 from fusion.learner import Label
-from fusion.lira import LiraSpf
 from fusion.method import Alone
 from fusion.record import RunWriter
 from fusion.requests import RequestDesk, RequestLine
 from fusion.service import serve
+from fusion.session import Apprentice
 from hal.bus import Bus
 from hal.messages import Decision, Episode
 from hal.remote import RemoteArena, RemoteRobot
@@ -42,7 +41,7 @@ def show_policy(args: argparse.Namespace, robot: RemoteRobot, publish: Publish, 
 
 
 def learn_from_person(
-    args: argparse.Namespace, robot: RemoteRobot, make: Callable[[], LiraSpf | HgDagger], publish: Publish, say: Say
+    args: argparse.Namespace, robot: RemoteRobot, make: Callable[[], Apprentice], publish: Publish, say: Say
 ) -> int:
     """Learn from whoever takes the wheel with the dead-man, until Ctrl-C; then save the novice."""
     profile = robot.profile

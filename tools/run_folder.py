@@ -8,7 +8,9 @@ from collections.abc import Callable
 from pathlib import Path
 
 from fusion.checkpoint import Checkpoint, save_checkpoint
+from fusion.ensemble import EnsembleNet
 from fusion.novice import Novice
+from fusion.presets import method_named
 from fusion.record import RunRecord
 from fusion.requests import Job
 from hal.profile import RobotProfile
@@ -20,9 +22,17 @@ FLOOR = "floor"  # the world of a robot that is in none of ours
 
 def head(args: argparse.Namespace, profile: RobotProfile, world: str) -> RunRecord:
     """How the run was started, from the arguments of `lira fusion`."""
-    preset = args.preset if args.method == "lira" else ""
+    method = method_named(args.method)
     return RunRecord(
-        world, profile.name, args.method, preset, args.layout, args.seed, command(args), version(), args.idle_frames
+        world,
+        profile.name,
+        method.kind,
+        method.name,
+        args.layout,
+        args.seed,
+        command(args),
+        version(),
+        args.idle_frames,
     )
 
 
@@ -38,6 +48,8 @@ def snapshot(
     `sync` makes sure of the labels. The writing raises `StorageError`.
     """
     labels, steps, network = novice.stored, novice.training_steps, copy.deepcopy(novice.network)
+    if isinstance(network, EnsembleNet):
+        network = network.novice()
     sizes = profile.features.bins, profile.features.filters
     about = Checkpoint("fusion", *sizes, profile.name, None, command(args), args.seed)
 

@@ -10,9 +10,10 @@ from safetensors.numpy import load_file
 from fusion.control import ControlLoop
 from fusion.demonstrations import DemonstrationLog
 from fusion.journal import Journal
-from fusion.lira import PRESETS
+from fusion.presets import METHODS
 from fusion.record import LapRecord, ResultRecord, RunRecord, RunWriter, StepRecord, read_run
 from fusion.session import Session
+from fusion.teacher import SKILLED
 from fusion.trainer import ProcessTrainer
 from hal.governed import GovernedRobot
 from hal.profile import load_profile
@@ -108,13 +109,13 @@ def test_in_process_gives_the_same_decisions_as_over_the_bus(demos, world, one_t
     twin = Twin(profile, floor)
     robot = GovernedRobot(twin)
     robot.open()
-    method = apprentice(PRESETS["hold"], profile, 0, partial(ProcessTrainer, adopt_after_s=profile.period_s))
+    method = apprentice(METHODS["hold"], profile, 0, partial(ProcessTrainer, adopt_after_s=profile.period_s))
     try:
         with RunWriter(tmp_path / "run.jsonl") as record, DemonstrationLog(tmp_path / "labels.lira", profile) as log:
             loop = ControlLoop(robot, truth=twin.state)
             session = Session(robot, twin, loop, Journal(keep=log.append, write=record.write), method)
             loop.arm()
-            session.teach([lap(profile, floor, 0)], teacher("scripted", profile, floor, 0, 0), LAPS)
+            session.teach([lap(profile, floor, 0)], teacher(SKILLED, profile, floor, 0, 0), LAPS)
     finally:
         method.novice.close()
         robot.close()

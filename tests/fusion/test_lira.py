@@ -237,8 +237,8 @@ def test_the_ledger_counts_interventions_by_edges_and_the_demonstration_apart():
     ledger = Ledger()
     lira = make_lira({"camera": STRAIGHT, "lidar": STRAIGHT}, PRESETS["hold"])
     human = (0.0, 1.0)
-    for trained, who in [(False, human), (False, human), (True, human), (True, None), (True, human), (True, human)]:
-        ledger.note(lira.learn(lira.propose(FEATURES), who), now_s=0.0, trained=trained)
+    for first, who in [(True, human), (True, human), (False, human), (False, None), (False, human), (False, human)]:
+        ledger.note(lira.learn(lira.propose(FEATURES), who), now_s=0.0, demonstrating=first)
     assert ledger.interventions == 1  # the demonstration, which went on into the first steps, is none
     assert ledger.labels.demonstration == 2
     assert (ledger.labels.given_human, ledger.labels.stored_human) == (3, 3)

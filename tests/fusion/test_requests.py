@@ -4,6 +4,7 @@ import contextlib
 import threading
 import time
 from dataclasses import dataclass, field, replace
+from types import MappingProxyType
 
 import pytest
 
@@ -83,6 +84,8 @@ class Learner:
 
 
 class Choosing(Learner):
+    offers = MappingProxyType({"camera": None})
+
     def choose(self, name):
         self.chosen.append(name)
         return None if name == "camera" else f"no expert is called '{name}'"
@@ -128,11 +131,8 @@ def test_a_pause_does_not_arm_a_robot_that_stopped_by_itself_and_the_person_who_
     robot = Drives()
     robot.held = Reason.STALE
     service = Service(Script([], ask(Request.PAUSE), [], ask(Request.RESUME)), robot=robot)
-    assert service.robot.twists == [
-        GO_TWIST,
-        STOP,
-        GO_TWIST,
-    ]  # what was refused, the neutral command at the end, the next
+    # What was refused; the neutral command at the end, once more since it is not obeyed; the next.
+    assert service.robot.twists == [GO_TWIST, STOP, STOP, GO_TWIST]
 
 
 def test_a_reset_puts_a_twin_back_and_begins_an_episode_after_a_neutral_command():

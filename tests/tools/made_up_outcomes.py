@@ -1,13 +1,13 @@
 """Outcomes with numbers chosen by hand, to check what is computed from them."""
 
 from fusion.ledger import Account
+from fusion.presets import METHODS
 from fusion.record import LapRecord, ResultRecord
-from tools.experiments.methods import HG_DAGGER, LIRA
+from tools.experiments.methods import LIRA
 from tools.experiments.notes import Track
 from tools.experiments.trial import Outcome, Trial
 
 HOLD = LIRA[0].name
-METHODS = {method.name: method for method in (*LIRA, *HG_DAGGER)}
 
 
 def lap(phase="train", number=1, **changes):

@@ -2,6 +2,7 @@
 
 import msgspec
 
+from fusion.hg_dagger import HgDaggerSettings
 from fusion.lira import PRESETS
 from fusion.teacher import PERFECT
 from tools.experiments.trial import Method, Trial
@@ -25,8 +26,9 @@ def write_world(folder):
     return str(path)
 
 
-def short_trial(world, *, seed=0, name="lira-hold", lira=PRESETS["hold"]):
-    return Trial(Method(name, lira), world, seed, teacher="perfect", skill=PERFECT, laps=1, unseen=1)
+def short_trial(world, *, seed=0, name="hold", lira=PRESETS["hold"]):
+    method = Method(name, lira or HgDaggerSettings())
+    return Trial(method, world, seed, teacher="perfect", skill=PERFECT, laps=1, unseen=1)
 
 
 def timeless(outcome):

@@ -167,22 +167,22 @@ def test_progress_is_a_bar_on_a_terminal_and_lines_elsewhere(terminal):
 
 
 def test_the_fingerprint_follows_the_world_and_the_experts(world, monkeypatch, tmp_path):
-    before = fingerprint(world)
+    before = fingerprint(world, "line")
     fingerprint.cache_clear()
-    assert fingerprint(world) == before
+    assert fingerprint(world, "line") == before
     text = Path(world).read_text()
     Path(world).write_text(text.replace("x_m = 8.0", "x_m = 8.1"))
     fingerprint.cache_clear()
-    assert fingerprint(world) != before
+    assert fingerprint(world, "line") != before
     Path(world).write_text("# a comment\n" + text)
     expert = tmp_path / "expert"
-    shutil.copy(fingerprints.shipped_path("lidar", fingerprints.load_profile("thesis-sim")), expert)
+    shutil.copy(fingerprints.expert_path("lidar", fingerprints.load_profile("thesis-sim")), expert)
     fingerprint.cache_clear()
-    assert fingerprint(world) == before
+    assert fingerprint(world, "line") == before
     expert.write_bytes(expert.read_bytes() + b"0")
-    monkeypatch.setattr(fingerprints, "shipped_path", lambda *_: expert)
+    monkeypatch.setattr(fingerprints, "expert_path", lambda *_: expert)
     fingerprint.cache_clear()
-    assert fingerprint(world) != before
+    assert fingerprint(world, "line") != before
     fingerprint.cache_clear()
 
 

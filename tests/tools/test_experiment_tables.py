@@ -10,9 +10,9 @@ from made_up_outcomes import HOLD, lap, outcome
 from fusion.ledger import Account
 from hal.errors import StorageError
 from tools.cli import main
-from tools.experiments import compare, densities, document, faults, thresholds, trajectories
+from tools.experiments import compare, densities, document, faults, sharing, thresholds, trajectories
 from tools.experiments.experiment import Finding, Picture
-from tools.experiments.measures import driving_row, effort_row, label_row
+from tools.experiments.measures import driving_row, effort_row, label_row, source_rows
 from tools.experiments.page import write_page
 from tools.experiments.registry import REGISTRY, load
 from tools.experiments.summary import read_summary, summarise, to_json
@@ -41,6 +41,15 @@ def test_the_humans_time_is_steps_at_five_hertz_and_the_experts_labels_are_those
     assert row["human_time_s"] == pytest.approx(10.0)
     assert row["human_total"] == 70
     assert row["with_experts"] > row["human_total"]
+
+
+def test_labels_are_counted_by_source():
+    accounts = [Account(given={"human": 10, "mean": 4}, stored={"human": 9, "mean": 1}), Account(given={"human": 20})]
+    rows = source_rows([outcome(HOLD, seed, account=each) for seed, each in enumerate(accounts)])
+    assert rows == [
+        {"method": HOLD, "source": "human", "given": 15.0, "stored": 4.5},
+        {"method": HOLD, "source": "mean", "given": 2.0, "stored": 0.5},
+    ]
 
 
 def test_only_laps_driven_to_the_end_have_a_time_to_finish():
@@ -148,6 +157,23 @@ def test_what_a_fault_costs_is_paired_with_the_perfect_teacher():
         assert sorted(changed) == sorted(names)
 
 
+def test_table_d1_sets_fixed_over_flexible():
+    taken = {"hold": (40, 8), "hold-fixed": (30, 20), "hold-flexible": (60, 10)}
+    outcomes = [
+        outcome(name.replace("hold", preset), seed, labels=labels, interventions=interventions)
+        for preset in sharing.PRESETS
+        for name, (labels, interventions) in taken.items()
+        for seed in range(3)
+    ]
+    medians = {(row["method"], row["quantity"]): row["median"] for row in sharing.ratios(outcomes)}
+    assert medians["hold-flexible", "human_labels"] == 0.5
+    assert medians["thesis-flexible", "interventions"] == 2.0
+    found = {finding.key: finding.agrees for finding in sharing.findings(outcomes)}
+    assert found["tableD1.hold-flexible.human_labels"]
+    assert found["tableD1.hold-flexible.interventions"]
+    assert not found["tableD1.hold-flexible.buffer"]  # both 90: on no side of 1
+
+
 def test_every_experiment_in_the_registry_can_be_loaded_and_lists_trials_for_its_seeds():
     for name in REGISTRY:
         trials = load(name).trials(2)
@@ -238,7 +264,7 @@ def test_some_methods_may_be_played_alone(capsys, tmp_path):
     alone = [each for each in compared(3) if each.trial.method.name == HOLD]
     race = load("race")
     assert race.ratios(alone) == []
-    assert [len(table.rows) for table in race.tables(alone)] == [1, 1, 1]
+    assert [len(table.rows) for table in race.tables(alone)] == [1, 1, 1, 1]
     assert [picture.name for picture in race.figures(alone)] == ["human_labels", "interventions"]
     where = ["--run", str(tmp_path), "--methods", f"{HOLD},hg"]
     assert main(["experiment", "race", *where]) == 2

@@ -56,7 +56,7 @@ def test_trials_do_not_depend_on_the_number_of_workers_and_resume(world, tmp_pat
     assert again == alone  # to the wall-clock time: read, not run
 
     rows = summary(alone)
-    assert [(row["method"], row["n"]) for row in rows] == [("lira-hold", 1), ("hg-dagger", 1)]
+    assert [(row["method"], row["n"]) for row in rows] == [("hold", 1), ("hg-dagger", 1)]
     pair = {row["quantity"]: row for row in ratios(alone)}
     expected = paired_ratios([alone[1].result.human_labels], [alone[0].result.human_labels])[0]
     assert pair["human_labels"]["median"] == pytest.approx(expected)

@@ -18,10 +18,10 @@ import torch
 
 from fusion.control import ControlLoop
 from fusion.demonstrations import DemonstrationLog
-from fusion.hg_dagger import HgDagger
 from fusion.journal import Journal
-from fusion.lira import PRESETS, LiraSpf
+from fusion.presets import METHODS
 from fusion.record import RunWriter
+from fusion.session import Apprentice
 from fusion.trainer import ProcessTrainer
 from hal.bus import Bus
 from hal.messages import Episode
@@ -71,8 +71,9 @@ def measure(layout: int) -> dict[str, float]:
 def drive(robot: RemoteRobot, layout: int, folder: Path) -> dict[str, float]:
     """Let LIRA-SPF drive and learn: first to warm up, then timed."""
     profile = robot.profile
-    settings = msgspec.structs.replace(PRESETS["hold"], start="experts")
-    method = apprentice(settings, profile, layout, partial(ProcessTrainer, adopt_after_s=profile.period_s))
+    hold = METHODS["hold"]
+    begun = msgspec.structs.replace(hold, approach=msgspec.structs.replace(hold.approach, start="experts"))
+    method = apprentice(begun, profile, layout, partial(ProcessTrainer, adopt_after_s=profile.period_s))
     decisions = robot.bus.publisher(DECISION)
     try:
         with DemonstrationLog(folder / "labels.lira", profile) as log, RunWriter(folder / "run.jsonl") as record:
@@ -100,7 +101,7 @@ def drive_until(
     robot: RemoteRobot,
     layout: int,
     loop: ControlLoop,
-    method: LiraSpf | HgDagger,
+    method: Apprentice,
     journal: Journal,
 ) -> None:
     """Drive until the robot's clock says so; after a crash or at the end it is put down anew."""

@@ -5,8 +5,16 @@ from functools import partial
 
 from fusion.tasks import task_of
 from tools.experiments.experiment import Experiment, Finding, Outcomes, Picture, Row, Table
-from tools.experiments.measures import by_method, driving_row, effort_row, expert_labels, label_row
-from tools.experiments.methods import HG_DAGGER, LIRA
+from tools.experiments.measures import (
+    by_method,
+    driving_row,
+    effort_row,
+    expert_labels,
+    label_row,
+    method_rows,
+    source_rows,
+)
+from tools.experiments.methods import FLOORS, HG_DAGGER, LIRA
 from tools.experiments.pairs import bounds, ratio, words
 from tools.experiments.pictures import box_pictures, spelt
 from tools.experiments.trial import Trial
@@ -40,12 +48,12 @@ THESIS_RATIOS = {"human_labels": 156.5 / 59, "interventions": 19.5 / 9.5}
 
 def trials(seeds: int, world: str) -> list[Trial]:
     """Every method on every seed."""
-    return [Trial(method, world, seed) for method in (*LIRA, *HG_DAGGER) for seed in range(seeds)]
+    return [Trial(method, world, seed) for method in (*LIRA, *HG_DAGGER, *FLOORS) for seed in range(seeds)]
 
 
 def summary(outcomes: Outcomes) -> list[Row]:
     """One row per method in the columns of Table II."""
-    return [{"method": method} | label_row(group) for method, group in by_method(outcomes).items()]
+    return method_rows(outcomes, label_row)
 
 
 def ratios(outcomes: Outcomes) -> list[Row]:
@@ -88,12 +96,12 @@ def amortised(outcomes: Outcomes) -> list[Row]:
 def tables(outcomes: Outcomes, thesis: Sequence[Row]) -> list[Table]:
     """The methods beside the thesis's, the paired ratios, and what else it took."""
     theirs = ", ".join(f"{value:.2f} {spelt(quantity)}" for quantity, value in THESIS_RATIOS.items())
-    groups = by_method(outcomes)
     found = [
         Table("Labels and interventions until the novice passed its proving run", [*summary(outcomes), *thesis]),
         Table("HG-DAgger over LIRA-SPF, by pairs of one seed", ratios(outcomes), f"Thesis, Table II: {theirs}."),
-        Table("Calls and the human's time", [{"method": name} | effort_row(group) for name, group in groups.items()]),
-        Table("Driving", [{"method": name} | driving_row(group) for name, group in groups.items()]),
+        Table("Calls and the human's time", method_rows(outcomes, effort_row)),
+        Table("Labels by source", source_rows(outcomes), "Given, and stored in the buffer; the rest was redundant."),
+        Table("Driving", method_rows(outcomes, driving_row)),
         Table("Labels that trained the experts, paid back", amortised(outcomes), "Labels are medians over the seeds."),
     ]
     return [table for table in found if table.rows]
@@ -132,7 +140,7 @@ EXPERIMENTS = {
         findings=partial(findings, name=name),
         figures=figures,
         ratios=ratios,
-        methods=tuple(method.name for method in (*LIRA, *HG_DAGGER)),
+        methods=tuple(method.name for method in (*LIRA, *HG_DAGGER, *FLOORS)),
     )
     for name, world, thesis in (("table2", "line-obstacles", THESIS), ("race", "race", []))
 }

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import msgspec
 
-from fusion.expert_files import SHIPPED, shipped_path
+from fusion.expert_files import SHIPPED, expert_path
 from fusion.tasks import TASKS, task_of
 from hal.profile import load_profile
 from sim_backend.catalogue import load_world
@@ -18,17 +18,16 @@ OURS = ("hal", "fusion", "sim_backend", "tools")
 
 
 @cache
-def fingerprint(world: str) -> str:
-    """Return 16 hex digits that change with anything a trial on this world could come out differently for.
+def fingerprint(world: str, pair: str) -> str:
+    """Return 16 hex digits that change with anything a trial here, with these experts, could come out differently for.
 
-    Of the code, what `START` imports counts, without comments and docstrings; of robots and experts, those of the
-    world's task.
+    Of the code, what `START` imports counts, without comments and docstrings; the robot is that of the world's task.
+    Raises `ConfigError` for an expert that is not there.
     """
-    task = task_of(world)
-    profile = load_profile(TASKS[task].profile)
+    profile = load_profile(TASKS[task_of(world)].profile)
     parts = [code(path) for path in sources(START)]
     parts += [msgspec.json.encode(each) for each in (load_world(world), profile)]
-    parts += [path.read_bytes() for path in (shipped_path(name, profile, task) for name in SHIPPED) if path.exists()]
+    parts += [expert_path(name, profile, pair).read_bytes() for name in SHIPPED]
     return hashlib.sha256(b"".join(hashlib.sha256(part).digest() for part in parts)).hexdigest()[:16]
 
 

@@ -26,6 +26,11 @@ def by_method(outcomes: Outcomes) -> dict[str, list[Outcome]]:
     return grouped(outcomes, lambda outcome: outcome.trial.method.name)
 
 
+def method_rows(outcomes: Outcomes, row: Callable[[Sequence[Outcome]], Row]) -> list[Row]:
+    """One row per method."""
+    return [{"method": method} | row(group) for method, group in by_method(outcomes).items()]
+
+
 def label_row(group: Sequence[Outcome]) -> Row:
     """The columns of Table II, medians over the seeds, with means and interquartile means of what is compared."""
     first = [outcome.after(1) for outcome in group]
@@ -74,6 +79,18 @@ def effort_row(group: Sequence[Outcome]) -> Row:
         "human_total": median(totals),
         "with_experts": median(totals) + sum(expert_labels(task).values()),
     }
+
+
+def source_rows(outcomes: Outcomes) -> list[Row]:
+    """Labels given and stored by each source of each method; medians over the seeds."""
+    rows: list[Row] = []
+    for method, group in by_method(outcomes).items():
+        accounts = [outcome.result.account for outcome in group]
+        for source in dict.fromkeys(source for each in accounts for source in each.given):
+            given = median([each.given.get(source, 0) for each in accounts])
+            stored = median([each.stored.get(source, 0) for each in accounts])
+            rows.append({"method": method, "source": source, "given": given, "stored": stored})
+    return rows
 
 
 def driving_row(group: Sequence[Outcome]) -> Row:

@@ -1,12 +1,7 @@
-"""The methods that are compared. Same network, same frozen trunks, same teacher: only the method differs."""
+"""The methods that are compared, from the one table. Same experts, same teacher, same layouts: the method differs."""
 
-from fusion.lira import PRESETS
-from fusion.novice import LearningSettings
-from tools.experiments.trial import Method
+from fusion.presets import METHODS
 
-LIRA = (Method("lira-hold", PRESETS["hold"]), Method("lira-thesis", PRESETS["thesis"]))
-HG_DAGGER = (
-    Method("hg-dagger"),
-    Method("hg-dagger-m10", learning=LearningSettings(labels_per_step=10)),
-    Method("hg-dagger-warm", warm=True),
-)
+LIRA = tuple(METHODS[name] for name in ("hold", "thesis"))
+HG_DAGGER = tuple(METHODS[name] for name in ("hg-dagger", "hg-dagger-m10", "hg-dagger-warm", "hg-dagger-warm-m10"))
+FLOORS = tuple(METHODS[name] for name in ("cloning", "switching"))  # no interaction, no learning

@@ -57,9 +57,9 @@ class Cluster:
             raise ConfigError(f"the cluster at {self.address} has no worker", f"Start some: {start}")
         if max(threads.values()) > 1:
             raise ConfigError("a worker of the cluster has more than one thread", f"Start it again: {start}")
-        for world in {trial.world for trial in trials}:
-            ours = fingerprint(world)
-            for worker, theirs in client.run(fingerprint, world).items():
+        for world, pair in {(trial.world, trial.pair) for trial in trials}:
+            ours = fingerprint(world, pair)
+            for worker, theirs in client.run(fingerprint, world, pair).items():
                 if theirs != ours:
                     raise ConfigError(
                         f"the worker {worker} has other code or other experts than this machine",

@@ -19,9 +19,11 @@ REGISTRY = {
     "race": Entry("the same on the 120 m race with 21 boxes (fig. 11, 12)", "compare"),
     "tableC1": Entry("activation thresholds on the figure-eight, redundancy filter off (Table C.1)", "thresholds"),
     "tableC2": Entry("activation and redundancy thresholds on the figure-eight (Table C.2)", "thresholds"),
+    "tableD1": Entry("shared feedback, fixed and flexible, on the figure-eight with boxes (Table D.1)", "sharing"),
     "labels": Entry("densities of the labels of the race by source (fig. E.4, E.5)", "densities"),
     "trajectories": Entry("the final novices' drives on the race (fig. E.6)", "trajectories"),
     "teacher": Entry("perfect, skilled and unskilled teachers, and one fault at a time", "faults"),
+    "variants": Entry("trunks from scratch, mirrored inputs, a stop in doubt: each against its base", "variants"),
 }
 
 

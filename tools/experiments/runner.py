@@ -22,14 +22,14 @@ def run_trials(trials: Sequence[Trial], folder: Path, pool: Pool) -> list[Outcom
 
     An outcome of other code or other experts is played again. Progress goes to standard error. Raises `StorageError`.
     """
-    prints = {world: fingerprint(world) for world in {trial.world for trial in trials}}
+    prints = {trial: fingerprint(trial.world, trial.pair) for trial in trials}
     done: dict[Trial, Outcome] = {}
     outdated = 0
     for trial in trials:
         outcome = kept(trial, folder)
         if outcome is None:
             continue
-        if outcome.fingerprint == prints[trial.world]:
+        if outcome.fingerprint == prints[trial]:
             done[trial] = outcome
         else:
             outdated += 1
@@ -38,7 +38,7 @@ def run_trials(trials: Sequence[Trial], folder: Path, pool: Pool) -> list[Outcom
     missing = [trial for trial in dict.fromkeys(trials) if trial not in done]
     with Bar(len(trials), len(trials) - len(missing)) as bar:
         for played in pool(missing) if missing else ():
-            outcome = msgspec.structs.replace(played, fingerprint=prints[played.trial.world])
+            outcome = msgspec.structs.replace(played, fingerprint=prints[played.trial])
             keep(outcome, folder)
             done[outcome.trial] = outcome
             bar.note(outcome)

@@ -51,6 +51,15 @@ def to_json(summary: Summary) -> str:
     return msgspec.json.format(msgspec.json.encode(summary), indent=2).decode()
 
 
+def write_summary(path: Path, summary: Summary) -> None:
+    """Write it, and the folder where there is none yet. Raises `StorageError`."""
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text(to_json(summary) + "\n", encoding="utf-8")
+    except OSError as error:
+        raise StorageError(f"cannot write {path}: {error.strerror}", "Choose another --summaries.") from error
+
+
 def read_summary(path: Path) -> Summary:
     """Read what `to_json` wrote. Raises `StorageError`."""
     try:

@@ -7,7 +7,7 @@ import numpy as np
 
 from tools.experiments.compare import trials
 from tools.experiments.experiment import Experiment, Finding, Outcomes, Picture, Row, Table
-from tools.experiments.measures import by_method, known, time_to_finish_s
+from tools.experiments.measures import by_method, known, method_rows, time_to_finish_s
 from tools.experiments.methods import HG_DAGGER, LIRA
 from tools.experiments.notes import Track
 from tools.experiments.trial import Outcome
@@ -22,7 +22,7 @@ def final(outcome: Outcome) -> Track | None:
 
 def rows(outcomes: Outcomes) -> list[Row]:
     """One row per method, over the final proving runs."""
-    return [{"method": method} | row(group) for method, group in by_method(outcomes).items()]
+    return method_rows(outcomes, row)
 
 
 def row(group: Sequence[Outcome]) -> Row:
@@ -66,7 +66,7 @@ def figures(outcomes: Outcomes) -> list[Picture]:
     tracks = {method: track for method, first in firsts.items() if (track := final(first)) is not None}
     trial = outcomes[0].trial
     words = f"Final novices on layout {trial.seed}; the colour is the speed, a dot a decision (thesis, E.6)"
-    return [Picture("drives", words, partial(plots.top_view, trial.world, tracks, trial.max_linear_m_s))]
+    return [Picture("drives", words, partial(plots.top_view, trial.world, tracks, trial.profile.base.max_linear_m_s))]
 
 
 EXPERIMENTS = {

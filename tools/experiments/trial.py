@@ -1,46 +1,27 @@
 """One trial: one method taught on one layout by one teacher, from scratch to convergence or its cap."""
 
 import hashlib
-from functools import cache
 from pathlib import Path
 
 import msgspec
 
 from fusion.control import ControlLoop
 from fusion.journal import Journal
-from fusion.learner import Label
-from fusion.lira import LiraSettings
-from fusion.method import Alone
-from fusion.novice import LearningSettings, Novice, is_redundant
-from fusion.preprocess import Features
+from fusion.presets import Method as Method
 from fusion.record import LapRecord, ResultRecord
 from fusion.session import Session
+from fusion.tasks import TASKS, task_of
 from fusion.teacher import SKILLED, TeacherSettings
 from fusion.trainer import InlineTrainer
 from hal.governed import GovernedRobot
 from hal.messages import Action
-from hal.profile import load_profile
+from hal.profile import RobotProfile, load_profile
 from sim_backend.catalogue import load_world
 from sim_backend.twin import Twin
-from tools.assembly import apprentice, lap, teacher
+from tools.assembly import crew, lap, teacher
 from tools.experiments.notes import Notes, Track
 
-PROFILE = "thesis-sim"
 UNSEEN = 1000  # layouts from here on belong to nobody's training
-WARM_WORLD, WARM_STEPS = "line", 250
-
-
-class Method(msgspec.Struct, frozen=True):
-    """A row of a table: LIRA-SPF with these settings or, without, HG-DAgger.
-
-    `warm` gives the novice, before anybody teaches it, what the camera expert does on the empty line: the fair
-    baseline, since it may use the same experts.
-    """
-
-    name: str
-    lira: LiraSettings | None = None
-    learning: LearningSettings = LearningSettings()
-    warm: bool = False
 
 
 class Trial(msgspec.Struct, frozen=True):
@@ -54,7 +35,22 @@ class Trial(msgspec.Struct, frozen=True):
     laps: int = 12
     all_laps: bool = False  # go on after the novice has passed
     unseen: int = 3
-    max_linear_m_s: float = 1.0
+    max_linear_m_s: float | None = None  # None: as fast as the robot goes
+    experts: str | None = None  # a pair, as in `fusion.expert_files`; None: those of the world's task
+
+    @property
+    def pair(self) -> str:
+        """Whose experts take part."""
+        return self.experts or task_of(self.world)
+
+    @property
+    def profile(self) -> RobotProfile:
+        """The robot of the world's task, at this trial's full speed."""
+        profile = load_profile(TASKS[task_of(self.world)].profile)
+        if self.max_linear_m_s is None:
+            return profile
+        base = msgspec.structs.replace(profile.base, max_linear_m_s=self.max_linear_m_s)
+        return msgspec.structs.replace(profile, base=base)
 
     @property
     def file(self) -> str:
@@ -78,8 +74,8 @@ class Outcome(msgspec.Struct, frozen=True):
     fingerprint: str = ""
 
     def after(self, lap_number: int) -> LapRecord:
-        """Totals after a training lap (the last one if there were fewer)."""
-        return [each for each in self.laps if each.phase == "train"][:lap_number][-1]
+        """Totals after a training lap (the last one if there were fewer; the proving run if there was none)."""
+        return ([each for each in self.laps if each.phase == "train"] or list(self.laps))[:lap_number][-1]
 
 
 def play(trial: Trial) -> Outcome:
@@ -87,51 +83,25 @@ def play(trial: Trial) -> Outcome:
     import torch
 
     torch.set_num_threads(1)
-    profile, world = load_profile(PROFILE), load_world(trial.world)
-    base = msgspec.structs.replace(profile.base, max_linear_m_s=trial.max_linear_m_s)
-    profile = msgspec.structs.replace(profile, base=base)
+    profile, world = trial.profile, load_world(trial.world)
     notes = Notes()
     twin = Twin(profile, world, layout=trial.seed, seed=trial.seed, renderer="tiny")
     robot = GovernedRobot(twin)
     robot.open()
-    method = apprentice(trial.method.lira, profile, trial.seed, InlineTrainer, trial.method.learning)
+    team = crew(trial.method, profile, trial.seed, InlineTrainer, trial.pair)
     try:
-        if trial.method.warm:
-            warm_up(method.novice)
         loop = ControlLoop(robot, truth=twin.state)
-        session = Session(robot, twin, loop, Journal(keep=notes.label, write=notes.record), method)
+        session = Session(robot, twin, loop, Journal(keep=notes.label, write=notes.record), team.pupil, team.alone)
         loop.arm()
         hand = teacher(trial.skill, profile, world, trial.seed, trial.seed)
-        converged = session.teach([lap(profile, world, trial.seed)], hand, trial.laps, all_laps=trial.all_laps)
-        session.show([lap(profile, world, UNSEEN + trial.seed * trial.unseen + k) for k in range(trial.unseen)])
+        course = [lap(profile, world, trial.seed)]
+        if team.pupil is None:
+            converged = session.prove(course)
+        else:
+            converged = session.teach(course, hand, trial.laps, all_laps=trial.all_laps)
+        unseen = [lap(profile, world, UNSEEN + trial.seed * trial.unseen + k) for k in range(trial.unseen)]
+        session.show(unseen, hand if team.answered else None)
         return Outcome(trial, tuple(notes.laps), session.result(converged), notes.labels, notes.tracks)
     finally:
-        method.novice.close()
+        team.close()
         robot.close()
-
-
-def warm_up(novice: Novice) -> None:
-    """Store the camera expert's labels of a drive along the empty line, without the redundant ones, and train."""
-    threshold = novice.settings.redundancy * novice.settings.action_range
-    for now_s, (features, action) in enumerate(camera_drive()):
-        if not is_redundant(action, novice.act(features), threshold):
-            novice.remember(Label(features.scan, features.image, action, "camera"))
-        novice.update(float(now_s))
-
-
-@cache
-def camera_drive() -> list[tuple[Features, Action]]:
-    """What the camera expert sees and does on its own line."""
-    from fusion.experts import load_expert
-
-    profile = load_profile(PROFILE)
-    expert = load_expert("camera-expert", profile)
-    robot = GovernedRobot(Twin(profile, WARM_WORLD, renderer="tiny"))
-    robot.open()
-    try:
-        loop = ControlLoop(robot)
-        loop.arm()
-        steps = [loop.step(Alone("camera", expert.act)) for _ in range(WARM_STEPS)]
-    finally:
-        robot.close()
-    return [(step.proposal.features, step.proposal.choice.action) for step in steps if step is not None]

@@ -113,8 +113,7 @@ def show(summary: "Summary", page: Path) -> None:
 def write_results(args: argparse.Namespace) -> int:
     """Play everything first if asked to; then write RESULTS.md from the summaries that are there."""
     from tools.experiments import document
-    from tools.experiments.summary import read_summaries, to_json
-    from tools.verbs.bench import write_file
+    from tools.experiments.summary import read_summaries, write_summary
 
     if args.methods is not None:
         raise ConfigError(f"{args.name} takes no --methods", "It is about all of them.")
@@ -122,7 +121,7 @@ def write_results(args: argparse.Namespace) -> int:
     for name in REGISTRY if args.name == ALL else ():
         print(f"\n{name}: {REGISTRY[name].words}")
         summary, page = play(args, name)
-        write_file(folder / f"{name}.json", to_json(summary))
+        write_summary(folder / f"{name}.json", summary)
         show(summary, page)
     summaries = read_summaries(folder, list(REGISTRY))
     if not summaries:

@@ -22,9 +22,7 @@ from hal.errors import ConfigError
 from tools.arguments import natural
 
 if TYPE_CHECKING:
-    from fusion.hg_dagger import HgDagger
-    from fusion.lira import LiraSettings, LiraSpf
-    from fusion.novice import LearningSettings
+    from fusion.presets import Method
     from hal.messages import Decision
     from hal.port import Arena
     from hal.remote import RemoteRobot
@@ -44,14 +42,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     what = parser.add_mutually_exclusive_group(required=True)
     what.add_argument("--policy", help="drive only: camera-expert, lidar-expert or a .safetensors file")
-    what.add_argument("--method", choices=("lira", "hg-dagger"), help="learn: LIRA-SPF or HG-DAgger")
-    add("--preset", choices=("hold", "thesis"), default="hold", help="LIRA-SPF's settings (default: %(default)s)")
-    add(
-        "--start",
-        choices=("human", "experts"),
-        default="human",
-        help="LIRA-SPF: who drives before the first training step (default: %(default)s)",
+    what.add_argument(
+        "--method",
+        help="learn by this method: hold or lira (LIRA-SPF), thesis, hg-dagger, ...; an unknown name lists them all",
     )
+    add("--start", choices=("human", "experts"), help="LIRA-SPF: who drives before the first training step")
     add(
         "--idle-frames",
         choices=("label", "skip"),
@@ -84,6 +79,8 @@ def run(args: argparse.Namespace) -> int:
     from hal.bus import Bus
     from hal.remote import RemoteRobot
 
+    if args.method is not None and method_of(args).kind == "switching" and args.teacher == "none":
+        raise ConfigError(f"by the method '{args.method}' nobody learns", "Show it on a twin with --teacher perfect.")
     torch.set_num_threads(1)  # the nets are small; and a result should not depend on the number of cores
     signal.signal(signal.SIGTERM, signal.default_int_handler)
     bus = Bus(args.name, connect=args.connect)
@@ -102,12 +99,13 @@ def run(args: argparse.Namespace) -> int:
 
 def learn_by_hand(args: argparse.Namespace, robot: "RemoteRobot") -> int:
     """Learn from whoever takes the wheel."""
+    from fusion.session import Apprentice
     from fusion.trainer import ProcessTrainer
     from tools.assembly import apprentice
     from tools.person import learn_from_person
 
-    def make() -> "LiraSpf | HgDagger":
-        return apprentice(lira_settings(args), robot.profile, args.seed, ProcessTrainer, learning_settings(args))
+    def make() -> Apprentice:
+        return apprentice(method_of(args), robot.profile, args.seed, ProcessTrainer)
 
     return learn_from_person(args, robot, make, publisher(robot), say)
 
@@ -141,7 +139,7 @@ def teach(args: argparse.Namespace, robot: "RemoteRobot", arena: "Arena", arena_
     from fusion.teacher import TEACHERS
     from fusion.trainer import ProcessTrainer
     from sim_backend.world import World
-    from tools.assembly import apprentice, lap, teacher
+    from tools.assembly import crew, lap, teacher
     from tools.run_folder import LABELS, RECORD, head, snapshot
 
     world = msgspec.json.decode(arena_info, type=World | None)
@@ -154,36 +152,41 @@ def teach(args: argparse.Namespace, robot: "RemoteRobot", arena: "Arena", arena_
     in_step = partial(ProcessTrainer, adopt_after_s=profile.period_s)  # one period later, whatever it took
     with DemonstrationLog(folder / LABELS, profile) as log, RunWriter(folder / RECORD) as record:
         record.write(head(args, profile, world.name))
-        method = apprentice(lira_settings(args), profile, args.seed, in_step, learning_settings(args))
+        team = crew(method_of(args), profile, args.seed, in_step)
         try:
             journal = Journal(keep=log.append, write=record.write, publish=publisher(robot))
             loop = ControlLoop(robot, truth=arena.state)
-            session = Session(robot, arena, loop, journal, method)
+            session = Session(robot, arena, loop, journal, team.pupil, team.alone)
             loop.arm()
             hand = teacher(TEACHERS[args.teacher], profile, world, args.layout, args.seed)
-            converged = session.teach([lap(profile, world, args.layout)], hand, args.train_laps)
-            snapshot(folder, method.novice, profile, args)()
-            session.show([lap(profile, world, args.layout + 1 + k) for k in range(args.unseen)])
+            course = [lap(profile, world, args.layout)]
+            if team.pupil is None:
+                converged = session.prove(course)
+            else:
+                converged = session.teach(course, hand, args.train_laps)
+                snapshot(folder, team.pupil.novice, profile, args)()
+            unseen = [lap(profile, world, args.layout + 1 + k) for k in range(args.unseen)]
+            session.show(unseen, hand if team.answered else None)
             record.write(session.result(converged))
         finally:
-            method.novice.close()
+            team.close()
     return 0 if converged else 1
 
 
-def lira_settings(args: argparse.Namespace) -> "LiraSettings | None":
-    """Return LIRA-SPF's settings, or None for HG-DAgger."""
+def method_of(args: argparse.Namespace) -> "Method":
+    """Return the method by name, with what the other arguments say about it. Raises `ConfigError`."""
     import msgspec
 
-    from fusion.lira import PRESETS
+    from fusion.lira import LiraSettings
+    from fusion.presets import method_named
 
-    return msgspec.structs.replace(PRESETS[args.preset], start=args.start) if args.method == "lira" else None
-
-
-def learning_settings(args: argparse.Namespace) -> "LearningSettings":
-    """Return how labels become a policy, with either method."""
-    from fusion.novice import LearningSettings
-
-    return LearningSettings(idle_frames=args.idle_frames)
+    method = method_named(args.method)
+    if args.start is not None:
+        if not isinstance(method.approach, LiraSettings):
+            raise ConfigError(f"'{method.name}' takes no --start", "Only LIRA-SPF does.")
+        method = msgspec.structs.replace(method, approach=msgspec.structs.replace(method.approach, start=args.start))
+    learning = msgspec.structs.replace(method.learning, idle_frames=args.idle_frames)
+    return msgspec.structs.replace(method, learning=learning)
 
 
 def publisher(robot: "RemoteRobot") -> Callable[["Decision"], None]:

@@ -1,0 +1,79 @@
+"""Every way of teaching that comes with the project, by name: the one table that commands, experiments and tests use.
+
+What belongs to an approach is in its own settings; what could be combined with any of them is in `Method`.
+"""
+
+from typing import Literal
+
+import msgspec
+
+from fusion.cloning import CloningSettings
+from fusion.hg_dagger import HgDaggerSettings
+from fusion.lira import PRESETS, LiraSettings
+from fusion.novice import LearningSettings
+from fusion.shared_feedback import SharingSettings
+from fusion.switching import SwitchingSettings
+from hal.errors import ConfigError
+
+Approach = LiraSettings | HgDaggerSettings | CloningSettings | SwitchingSettings
+Sensor = Literal["camera", "lidar"]
+
+
+class Method(msgspec.Struct, frozen=True):
+    """A way of teaching by name.
+
+    `trunks`: "frozen" copies of the experts' trunks, or "scratch" (everything is learned). `warm` names the experts
+    that teach the novice what they do on their own training course before any human does. `mirrored` learns every
+    label once more with left and right exchanged. `sharing` adds Appendix D to LIRA-SPF.
+    """
+
+    name: str
+    approach: Approach
+    learning: LearningSettings = LearningSettings()
+    trunks: Literal["frozen", "scratch"] = "frozen"
+    warm: tuple[Sensor, ...] = ()
+    mirrored: bool = False
+    sharing: SharingSettings | None = None
+
+    @property
+    def kind(self) -> str:
+        """Which approach it is, in one word."""
+        return str(type(self.approach).__struct_config__.tag)
+
+
+_HOLD = PRESETS["hold"]
+_HG = HgDaggerSettings()
+_M10 = LearningSettings(labels_per_step=10)
+_BOTH: tuple[Sensor, ...] = ("camera", "lidar")
+
+METHODS = {
+    method.name: method
+    for method in (
+        Method("hold", _HOLD),
+        Method("thesis", PRESETS["thesis"]),
+        Method("hold-fixed", _HOLD, sharing=SharingSettings(when="fixed")),
+        Method("hold-flexible", _HOLD, sharing=SharingSettings(when="flexible")),
+        Method("thesis-fixed", PRESETS["thesis"], sharing=SharingSettings(when="fixed")),
+        Method("thesis-flexible", PRESETS["thesis"], sharing=SharingSettings(when="flexible")),
+        Method("hold-scratch", _HOLD, trunks="scratch"),
+        Method("hold-mirrored", _HOLD, mirrored=True),
+        Method("hg-dagger", _HG),
+        Method("hg-dagger-m10", _HG, _M10),
+        Method("hg-dagger-warm", _HG, warm=_BOTH),
+        Method("hg-dagger-warm-m10", _HG, _M10, warm=_BOTH),
+        Method("hg-dagger-scratch", _HG, trunks="scratch"),
+        Method("hg-dagger-mirrored", _HG, mirrored=True),
+        Method("hg-dagger-doubt", HgDaggerSettings(doubt=("unseen",))),
+        Method("cloning", CloningSettings(), LearningSettings(filter_human=False)),
+        Method("switching", SwitchingSettings()),
+    )
+}
+ALIASES = {"lira": "hold"}
+
+
+def method_named(name: str) -> Method:
+    """Look a method up. Raises `ConfigError` for a name that is none."""
+    try:
+        return METHODS[ALIASES.get(name, name)]
+    except KeyError:
+        raise ConfigError(f"unknown method '{name}'", f"Known: {', '.join([*ALIASES, *METHODS])}.") from None

@@ -1,0 +1,55 @@
+"""A novice for tests of methods: a small network whose training ends at the poll after it began."""
+
+import numpy as np
+
+from fusion.method import Expert
+from fusion.novice import LearningSettings, Novice
+from fusion.preprocess import Features
+
+FEATURES = Features(np.full(101, 0.9, np.float32), np.full((32, 32), 0.5, np.float32))
+
+
+class FixedNetwork:
+    def __init__(self, action):
+        self.action = action
+
+    def act(self, scan, image):
+        return self.action
+
+    def load_weights(self, weights):
+        self.loaded = weights
+
+
+class Trainer:
+    """Counts what it is given; has weights at the poll after each start."""
+
+    def __init__(self):
+        self.labels, self.started, self.pending = [], 0, False
+
+    def add(self, label):
+        self.labels.append(label)
+
+    def start(self, now_s):
+        self.started += 1
+        self.pending = True
+
+    def poll(self, now_s):
+        done, self.pending = self.pending, False
+        return {} if done else None
+
+    def close(self):
+        pass
+
+
+def make_novice(action=(0.9, -0.3), *, trained=True, **settings):
+    """A novice that always does `action`, and its trainer."""
+    trainer = Trainer()
+    novice = Novice(FixedNetwork(action), trainer, LearningSettings(**settings))
+    novice.training_steps = int(trained)
+    return novice, trainer
+
+
+def play(name, actions):
+    """An expert that plays back actions, one each time it is asked."""
+    stream = iter(actions)
+    return Expert(name, lambda _: next(stream))

@@ -1,0 +1,37 @@
+import msgspec
+import pytest
+
+from fusion.hg_dagger import HgDaggerSettings
+from fusion.lira import LiraSettings
+from fusion.presets import ALIASES, METHODS, Method, method_named
+from hal.errors import ConfigError
+
+
+def test_every_method_goes_through_json_as_it_is():
+    for name, method in METHODS.items():
+        assert method.name == name
+        assert msgspec.json.decode(msgspec.json.encode(method), type=Method) == method
+    assert len({msgspec.json.encode(method) for method in METHODS.values()}) == len(METHODS)
+
+
+def test_the_thesis_is_to_the_letter_and_hold_is_the_default():
+    assert METHODS["thesis"].approach == LiraSettings(hold=None)
+    assert METHODS["hold"].approach == LiraSettings()
+    assert method_named("lira") is METHODS["hold"]
+    assert not set(ALIASES) & set(METHODS)
+
+
+def test_what_is_beyond_a_method_is_off_unless_its_name_says_so():
+    for name in ("hold", "thesis", "hg-dagger"):
+        method = METHODS[name]
+        assert (method.trunks, method.warm, method.mirrored, method.sharing) == ("frozen", (), False, None)
+        assert method.learning.labels_per_step == 30
+    assert METHODS["hg-dagger"].approach == HgDaggerSettings(doubt=())
+    assert METHODS["hg-dagger-warm-m10"].learning.labels_per_step == 10
+    assert METHODS["hg-dagger-warm-m10"].warm == METHODS["hg-dagger-warm"].warm == ("camera", "lidar")
+
+
+def test_an_unknown_name_lists_the_known_ones():
+    with pytest.raises(ConfigError, match="unknown method 'dagger'") as refused:
+        method_named("dagger")
+    assert all(name in refused.value.remedy for name in [*ALIASES, *METHODS])
