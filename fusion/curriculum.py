@@ -56,15 +56,15 @@ def _passage() -> Curriculum:
 
     Each from a few metres before it: nothing on the open floor between them tells a sensor which way leads on.
     """
-    teacher = msgspec.structs.replace(STRICT, margin_m=0.12, lateral_m=1.5, stray_m=0.5)
-    wide = ((10.5, 6.0), (15.3, 7.5), (31.5, 6.5), (37.8, 6.5), (43.5, 8.0), (51.0, 6.0))
+    teacher = msgspec.structs.replace(STRICT, margin_m=0.15, lateral_m=1.5, stray_m=0.5)
+    places = ((10.5, 4.5), (15.3, 7.0), (31.5, 5.0), (37.8, 5.0), (43.5, 7.0), (51.0, 4.5))
     through = [
-        Drive(Episode(0, start_m=start, lateral_m=lateral), limit_s, "stay", final_lateral_m=0.5)
+        Drive(Episode(0, start_m=start, lateral_m=lateral), limit_s, "stay", final_lateral_m=1.0)
         for lateral in (0.0, 0.15, -0.15)
-        for start, limit_s in wide
+        for start, limit_s in places
     ]
-    around = [Drive(Episode(layout, start_m=start), 10.0, "stay") for layout in range(3) for start in (1.0, 21.5)]
-    return Curriculum("passage-train", teacher, (*through, *around), laps=12, cruise_world="passage", cruise_steps=10)
+    around = [Drive(Episode(layout, start_m=start), 6.0, "stay") for layout in range(2) for start in (1.0, 22.0)]
+    return Curriculum("passage-train", teacher, (*through, *around), laps=20, cruise_world="passage", cruise_steps=10)
 
 
 def _garden_camera() -> Curriculum:
@@ -85,14 +85,14 @@ def _garden_lidar() -> Curriculum:
 
 def _corridor_camera() -> Curriculum:
     """Down the middle of the corridor, with white spots alone on its floor (fig. F.2a)."""
-    return _edge("corridor-train", askew=[(0.4, 0.0), (-0.4, 0.0), (0.3, 0.3), (-0.3, -0.3)], starts=(4.0, 14.0))
+    return _edge("corridor-train", askew=[(0.4, 0.0), (-0.4, 0.0), (0.3, 0.3), (-0.3, -0.3)], starts=(4.0,))
 
 
 def _edge(world: str, askew: Sequence[tuple[float, float]], starts: Sequence[float]) -> Curriculum:
-    """The whole way at the real robot's pace, then back to it from places and headings beside it."""
-    teacher = msgspec.structs.replace(STRICT, lateral_m=0.2, stray_m=0.2, horizon_s=2.0)
+    """Back to the way from places and headings beside it, then all of it, at the real robot's pace."""
+    teacher = msgspec.structs.replace(STRICT, lateral_m=0.2, stray_m=0.2)
     recoveries = [
-        Drive(Episode(k, start_m=start, lateral_m=lateral, yaw_rad=yaw), 12.0, "stay", final_lateral_m=0.2)
+        Drive(Episode(k, start_m=start, lateral_m=lateral, yaw_rad=yaw), 10.0, "stay", final_lateral_m=0.2)
         for start in starts
         for k, (lateral, yaw) in enumerate(askew)
     ]

@@ -5,6 +5,8 @@ closed, not at every label, which could stall the control loop: a power cut can 
 
 Layout, little-endian: a header (magic, version, bins, px, profile, CRC-32), then records of one size, each with a
 CRC-32 of its own. One size keeps a damaged record from hiding the ones behind it.
+
+The byte of flags and the number of the run were zero bits in the first logs, which read as run 0, not mirrored.
 """
 
 import fcntl
@@ -12,12 +14,13 @@ import os
 import struct
 import zlib
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import BinaryIO
 
 import numpy as np
 
+from fusion.labels import is_rest
 from fusion.preprocess import from_uint8, to_uint8
 from hal.errors import StorageError
 from hal.messages import Action, FloatArray
@@ -29,7 +32,9 @@ VERSION = 1
 RESERVE = 256
 
 _HEADER = struct.Struct("<8sHHHH")  # magic, version, bins, px, bytes of the profile's name
-_FIELDS = struct.Struct("<dqi?32sdddd")  # stamp, observation, lap, stored, source, action, novice's action
+_FIELDS = struct.Struct("<dqHHB32sdddd")  # stamp, observation, lap, run, flags, source, action, novice's action
+_STORED, _MIRRORED = 1, 2
+_MOST = 2**16 - 1  # laps and runs are not counted further
 _CRC = struct.Struct("<I")
 
 
@@ -38,7 +43,8 @@ class Demonstration:
     """One label that was given, and whether the redundancy filter stored it.
 
     `source` is "human", an expert's name or "mean"; `novice` is a^N at that time; `scan` float32 [bins] and `image`
-    float32 [px, px] are the features.
+    float32 [px, px] are the features. `mirrored`: it was learned with left and right exchanged, too. `run` is which
+    opening of the log it was given in, from 0; the log sets both.
     """
 
     stamp_s: float
@@ -50,6 +56,13 @@ class Demonstration:
     stored: bool
     scan: FloatArray
     image: FloatArray
+    mirrored: bool = False
+    run: int = 0
+
+    @property
+    def idle(self) -> bool:
+        """Whether the human held the wheel and did nothing."""
+        return self.source == "human" and is_rest(self.action)
 
 
 @dataclass(frozen=True, slots=True)
@@ -76,15 +89,17 @@ class _Format:
                 f"a label of '{record.source}' with a scan {record.scan.shape} and an image {record.image.shape} "
                 f"does not fit a log of {self.bins} bins and {self.px} px"
             )
-        fields = (record.stamp_s, record.observation, record.lap, record.stored, source, *record.action, *record.novice)
+        flags = _STORED * record.stored + _MIRRORED * record.mirrored
+        counts = min(record.lap, _MOST), min(record.run, _MOST)
+        fields = (record.stamp_s, record.observation, *counts, flags, source, *record.action, *record.novice)
         scan = np.ascontiguousarray(record.scan, dtype="<f4").tobytes()
         return _sealed(_FIELDS.pack(*fields) + scan + to_uint8(record.image).tobytes())
 
     def decode(self, data: bytes) -> Demonstration | None:
         """None for bytes that are not a whole record."""
-        if len(data) != self.record_bytes or not _is_sealed(data):
+        if not self.is_whole(data):
             return None
-        stamp_s, observation, lap, stored, source, *actions = _FIELDS.unpack_from(data)
+        stamp_s, observation, lap, run, flags, source, *actions = _FIELDS.unpack_from(data)
         scan = np.frombuffer(data, "<f4", self.bins, _FIELDS.size).astype(np.float32)
         gray = np.frombuffer(data, np.uint8, self.px**2, _FIELDS.size + 4 * self.bins).reshape(self.px, self.px)
         return Demonstration(
@@ -94,20 +109,28 @@ class _Format:
             source=source.rstrip(b"\0").decode(),
             action=(actions[0], actions[1]),
             novice=(actions[2], actions[3]),
-            stored=stored,
+            stored=bool(flags & _STORED),
             scan=scan,
             image=from_uint8(gray),
+            mirrored=bool(flags & _MIRRORED),
+            run=run,
         )
+
+    def is_whole(self, data: bytes) -> bool:
+        """Whether these bytes are one record."""
+        return len(data) == self.record_bytes and _is_sealed(data)
 
 
 class DemonstrationLog:
     """The writing end. `count` records were good when it was opened, `repaired_bytes` of a torn tail were cut off.
 
+    `run` is the number of this opening; `mirrored` says how the stored labels are learned. Nothing is kept in memory.
     Raises `StorageError` when the file is another robot's, corrupt, in use by another process, or cannot be written.
     """
 
-    def __init__(self, path: Path, profile: RobotProfile) -> None:
+    def __init__(self, path: Path, profile: RobotProfile, *, mirrored: bool = False) -> None:
         self._path = path
+        self._mirrored = mirrored
         self._format = _Format(profile.features.bins, profile.features.image_px, profile.name)
         self._unwritten: list[bytes] = []
         try:
@@ -117,7 +140,7 @@ class DemonstrationLog:
             raise StorageError(f"cannot open {path}: {error.strerror}", "Choose another folder.") from error
         try:
             self._lock()
-            self.count, self._end = self._recover()
+            self.count, self._end, self.run = self._recover()
             self.repaired_bytes = os.fstat(self._file).st_size - self._end
             os.ftruncate(self._file, self._end)
             if self._end == 0:
@@ -133,6 +156,7 @@ class DemonstrationLog:
         Raises `StorageError` when the disk is nearly full, though this label is stored, and when it is full or fails:
         then the label is kept in memory and written before the next one.
         """
+        record = replace(record, run=self.run, mirrored=self._mirrored and record.stored)
         self._unwritten.append(self._format.encode(record))
         self._drain()
         self._check_space()
@@ -196,14 +220,17 @@ class DemonstrationLog:
             remedy = "Stop the other one, or give this one another file."
             raise StorageError(f"{self._path} is in use by another process", remedy) from error
 
-    def _recover(self) -> tuple[int, int]:
-        """Return the number of good records and where they end. Raises `StorageError` for a file to keep off."""
+    def _recover(self) -> tuple[int, int, int]:
+        """Return the number of good records, where they end, and which run begins.
+
+        Raises `StorageError` for a file to keep off.
+        """
         header = self._format.header()
         with self._path.open("rb") as file:
             if header.startswith(file.read(len(header) + 1)):  # new, or torn in its very first write
                 file.seek(0, os.SEEK_END)
                 if file.tell() < len(header):
-                    return 0, 0
+                    return 0, 0, 0
             file.seek(0)
             found = _read_format(file, self._path)
             if found != self._format:
@@ -212,8 +239,11 @@ class DemonstrationLog:
                     f"not for '{self._format.profile}' ({self._format.bins} bins, {self._format.px} px)",
                     "Give a new file for this robot.",
                 )
-            count = sum(1 for _ in _records(file, found, self._path))
-        return count, len(header) + count * found.record_bytes
+            count, last = 0, b""
+            for data in _records(file, found, self._path):
+                count, last = count + 1, data
+        newest = found.decode(last)
+        return count, len(header) + count * found.record_bytes, 0 if newest is None else newest.run + 1
 
 
 def read_demonstrations(path: Path) -> Iterator[Demonstration]:
@@ -223,7 +253,11 @@ def read_demonstrations(path: Path) -> Iterator[Demonstration]:
     """
     try:
         with path.open("rb") as file:
-            yield from _records(file, _read_format(file, path), path)
+            form = _read_format(file, path)
+            for data in _records(file, form, path):
+                record = form.decode(data)
+                if record is not None:
+                    yield record
     except OSError as error:
         raise StorageError(f"cannot read {path}: {error.strerror}", "Check the path.") from error
 
@@ -241,21 +275,20 @@ def _read_format(file: BinaryIO, path: Path) -> _Format:
     return _Format(bins, px, rest[:name_bytes].decode())
 
 
-def _records(file: BinaryIO, form: _Format, path: Path) -> Iterator[Demonstration]:
-    """Decode records up to the torn tail. A bad one with a good one behind it is damage, not a torn tail."""
+def _records(file: BinaryIO, form: _Format, path: Path) -> Iterator[bytes]:
+    """Whole records up to the torn tail. A bad one with a good one behind it is damage, not a torn tail."""
     count = 0
     while data := file.read(form.record_bytes):
-        record = form.decode(data)
-        if record is None:
+        if not form.is_whole(data):
             offset = file.tell() - len(data)
-            if any(form.decode(later) for later in iter(lambda: file.read(form.record_bytes), b"")):
+            if any(form.is_whole(later) for later in iter(lambda: file.read(form.record_bytes), b"")):
                 raise StorageError(
                     f"{path} is corrupt at byte {offset}; the {count} records before it are good",
                     "Restore the file from a copy, or move it away and start a new one.",
                 )
             return
         count += 1
-        yield record
+        yield data
 
 
 def _sealed(data: bytes) -> bytes:

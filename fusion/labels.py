@@ -6,6 +6,8 @@ import numpy as np
 
 from hal.messages import Action, FloatArray
 
+REST = 1e-6  # an action within this of zero is none
+
 
 @dataclass(frozen=True, slots=True)
 class Label:
@@ -16,6 +18,11 @@ class Label:
     action: Action
     source: str
     weight: float = 1.0
+
+
+def is_rest(action: Action) -> bool:
+    """Whether nothing is done."""
+    return max(map(abs, action)) <= REST
 
 
 def mirror(label: Label) -> Label:

@@ -4,13 +4,13 @@ import math
 import time
 from typing import Literal, Protocol
 
+from fusion.labels import is_rest
 from fusion.learner import Label, Weights
 from fusion.networks import Network
 from fusion.preprocess import Features
 from hal.config import Table
 from hal.messages import Action
 
-REST = 1e-6  # an action within this of zero is none
 CATCH_UP_POLL_S = 0.005
 
 
@@ -86,7 +86,7 @@ class Novice:
 
     def leaves_out(self, human: Action) -> bool:
         """Whether the human's action is an idle frame that is to be no label."""
-        return self.settings.idle_frames == "skip" and max(map(abs, human)) <= REST
+        return self.settings.idle_frames == "skip" and is_rest(human)
 
     def remember(self, label: Label) -> None:
         """Take in a label that an earlier session stored."""

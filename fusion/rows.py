@@ -3,6 +3,7 @@
 import errno
 import os
 import tempfile
+import weakref
 from collections.abc import Sequence
 
 import numpy as np
@@ -46,6 +47,7 @@ class FileRows:
     def __init__(self, scan: tuple[int, ...], image: tuple[int, ...]) -> None:
         self._row = np.dtype([("scan", np.float32, scan), ("image", np.uint8, image)])
         self._file = tempfile.TemporaryFile(buffering=0)  # noqa: SIM115 - lives as long as the rows do
+        weakref.finalize(self, self._file.close)
         self.count = 0
 
     def append(self, scan: FloatArray, image: ByteArray) -> None:

@@ -13,6 +13,7 @@ from fusion.experts import load_expert
 from fusion.journal import Journal
 from fusion.learner import Label
 from fusion.method import Alone
+from fusion.presets import method_named
 from fusion.record import RunWriter
 from fusion.requests import RequestDesk, RequestLine
 from fusion.service import serve
@@ -47,7 +48,8 @@ def learn_from_person(
     profile = robot.profile
     folder: Path = args.run or Path("runs") / args.method
     # The log goes first: if it is damaged, nothing else is touched.
-    with DemonstrationLog(folder / LABELS, profile) as log, RunWriter(folder / RECORD) as record:
+    mirrored = method_named(args.method).mirrored
+    with DemonstrationLog(folder / LABELS, profile, mirrored=mirrored) as log, RunWriter(folder / RECORD) as record:
         method = make()
         novice = method.novice
         try:

@@ -2,7 +2,6 @@
 
 from dataclasses import replace
 from pathlib import Path
-from typing import Literal
 
 import msgspec
 import numpy as np
@@ -11,6 +10,7 @@ import torch
 from fusion.checkpoint import Checkpoint, save_checkpoint
 from fusion.control import ControlLoop
 from fusion.curriculum import Curriculum, curriculum
+from fusion.expert_files import SHIPPED, Sensor, folder_of, seeded
 from fusion.hg_dagger import HgDagger
 from fusion.journal import Journal
 from fusion.learner import Learner
@@ -19,28 +19,27 @@ from fusion.networks import CameraNet, LidarNet, Network
 from fusion.novice import LearningSettings, Novice
 from fusion.record import Record
 from fusion.session import Session
+from fusion.tasks import DEFAULT, TASKS
 from fusion.teacher import ScriptedTeacher
 from fusion.trainer import InlineTrainer
+from hal.errors import LiraError
 from hal.governed import GovernedRobot
 from hal.messages import Action
-from hal.profile import RobotProfile
+from hal.profile import RobotProfile, load_profile
 from sim_backend.catalogue import load_world
-from sim_backend.foresight import Foresight
+from sim_backend.foresight import Foresight, sketching
 from sim_backend.twin import Twin
 from tools.progress import Progress
 
 BLIND_PX = 4
 
 
-def train_expert(
-    kind: Literal["camera", "lidar"], task: str, profile: RobotProfile, seed: int, path: Path, command: str
-) -> bool:
+def train_expert(kind: Sensor, task: str, profile: RobotProfile, seed: int, path: Path, command: str) -> bool:
     """Train a task's camera or lidar expert and save it to `path` if it passes. Returns whether it did."""
     torch.set_num_threads(1)
     course = curriculum(kind, task)
     world = load_world(course.world)
-    if kind == "lidar":
-        profile = blindfolded(profile)
+    profile = blindfolded(profile) if kind == "lidar" else sketching(profile)
     shape = profile.features
     network: Network
     network = CameraNet(shape.filters, seed=seed) if kind == "camera" else LidarNet(shape.bins, seed=seed)
@@ -69,6 +68,28 @@ def train_expert(
         save_checkpoint(path, network, replace(about, labels=novice.stored, training_steps=novice.training_steps))
         print(f"{kind} expert: {novice.stored} labels, {novice.training_steps} training steps, saved to {path}")
     return passed
+
+
+def provide(pair: str) -> None:
+    """Train the experts of a pair named TASK@SEED that are not there yet; others have to be there.
+
+    Raises `LiraError` for an expert that does not pass its curriculum.
+    """
+    found = seeded(pair)
+    if found is None:
+        return
+    task, seed = found
+    profile = load_profile(TASKS[task].profile)
+    for kind in SHIPPED:
+        path = folder_of(pair) / f"{kind}.safetensors"
+        if not path.exists() and not train_expert(kind, task, profile, seed, path, command(kind, task, profile, seed)):
+            raise LiraError(f"the {kind} expert of {pair} did not pass its curriculum", "Try another seed.")
+
+
+def command(kind: str, task: str, profile: RobotProfile, seed: int) -> str:
+    """Return the words that train an expert."""
+    words = "" if task == DEFAULT else f" --task {task}"
+    return f"lira train-expert {kind}{words} --profile {profile.name} --seed {seed}"
 
 
 def blindfolded(profile: RobotProfile) -> RobotProfile:

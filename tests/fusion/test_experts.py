@@ -2,11 +2,14 @@ import numpy as np
 import pytest
 
 from fusion.checkpoint import Checkpoint, save_checkpoint
+from fusion.expert_files import folder_of
 from fusion.experts import as_expert, load_expert, load_network
 from fusion.networks import CameraNet, FusionNet, LidarNet
 from fusion.preprocess import Features
+from fusion.tasks import DEFAULT, TASKS, task_of
 from hal.errors import ConfigError, StorageError
 from hal.profile import load_profile
+from sim_backend.catalogue import load_world
 
 SIM, REAL = load_profile("thesis-sim"), load_profile("rosbot2")
 FEATURES = Features(np.full(101, 0.5, np.float32), np.full((32, 32), 0.5, np.float32))
@@ -28,6 +31,49 @@ def test_the_experts_that_come_with_the_project_load_by_name(name):
     assert -1.0 <= angular <= 1.0
     _, checkpoint = load_network(name, SIM)
     assert checkpoint.provenance.startswith(f"lira train-expert {name}")
+
+
+@pytest.mark.parametrize("task", [name for name in TASKS if name != DEFAULT])
+@pytest.mark.parametrize("name", ["camera", "lidar"])
+def test_every_task_has_its_experts_for_its_robot(task, name):
+    profile = load_profile(TASKS[task].profile)
+    assert load_expert(f"{name}-expert", profile, task).name == name
+    _, checkpoint = load_network(name, profile, task)
+    owner = TASKS[task].lidar if name == "lidar" else task
+    assert checkpoint.provenance == f"lira train-expert {name} --task {owner} --profile {profile.name} --seed 0"
+    assert checkpoint.labels > 30
+
+
+def test_the_experts_of_a_world_are_those_of_its_task():
+    assert [task_of(world) for world in ("race", "passage", "garden", "corridor", "my-own")] == [
+        "line",
+        "passage",
+        "garden",
+        "corridor",
+        "line",
+    ]
+    assert all(load_world(world).name == world for task in TASKS.values() for world in task.worlds)
+
+
+def test_a_pair_of_ones_own_is_a_folder(tmp_path):
+    for kind, network in (("camera", CameraNet(16)), ("lidar", LidarNet(101))):
+        save(tmp_path / f"{kind}.safetensors", kind, network, 101, 16, cruise=(0.9, 0.01))
+        assert load_expert(f"{kind}-expert", SIM, str(tmp_path)).cruise == (0.9, 0.01)
+
+
+def test_a_folder_without_the_expert_says_how_to_make_it(tmp_path):
+    with pytest.raises(ConfigError, match=r"no lidar expert .*lidar.safetensors.*lira train-expert lidar .*--out"):
+        load_expert("lidar-expert", SIM, str(tmp_path))
+
+
+def test_a_seeded_pair_has_a_folder_of_its_own():
+    assert folder_of("line@2").name == "line-2"
+
+
+@pytest.mark.parametrize("pair", ["lane@1", "line@", "line@x", "@1"])
+def test_a_seeded_pair_of_no_task_is_refused(pair):
+    with pytest.raises(ConfigError, match=r"is no pair of experts.*line@1.*passage"):
+        folder_of(pair)
 
 
 def test_an_unknown_name_lists_the_known_ones():

@@ -1,10 +1,13 @@
 """The fields that `lira bench preprocess` and `lira bench train` promise. How fast they are is for the benchmarks."""
 
 import numpy as np
+import pytest
+from short_trials import write_world
 
+from fusion.control import ControlLoop
 from fusion.preprocess import gray_image
 from hal.messages import CompressedImage
-from tools.bench import preprocess, train
+from tools.bench import log, preprocess, step, train
 
 
 def test_preprocess_compares_two_ways_to_the_same_image(monkeypatch):
@@ -33,3 +36,30 @@ def test_train_has_a_row_per_network_and_kind_of_training(monkeypatch):
         assert row["speedup"] > 0
         assert row["decisions"] >= 1
         assert 0 <= row["deadline_misses"] <= row["decisions"]
+
+
+def test_log_writes_opens_and_learns_all_labels_and_says_what_memory_that_takes(monkeypatch):
+    monkeypatch.setattr(log, "LABELS", 300)
+    rows = log.run()
+    assert [row["what"] for row in rows] == ["append", "open again", "read and learn", "one training step"]
+    assert all(row["labels"] == 300 and row["rss_mb"] > 0 for row in rows)
+    assert rows[0]["file_mb"] > 300 * 1.4e-3
+
+
+def test_step_divides_the_time_of_every_step_among_its_parts(monkeypatch, tmp_path):
+    monkeypatch.setattr(step, "WORLD", write_world(tmp_path))
+    monkeypatch.setattr(step, "LAPS", 1)
+    rows = {row["part"]: row for row in step.run()}
+    assert rows["teacher: look ahead"]["steps"] <= rows["a decision step"]["steps"]
+    assert sum(row.get("share_percent", 0.0) for row in rows.values()) == pytest.approx(100.0)
+    assert rows["the whole run"]["laps"] == 1
+    assert ControlLoop.step.__name__ == "step"  # nothing stays behind
+
+
+def test_the_stopwatch_gives_every_part_its_own_time(monkeypatch):
+    now = iter([0.0, 1.0, 4.0, 6.0])
+    monkeypatch.setattr(step.time, "perf_counter", lambda: next(now))
+    watch = step.Stopwatch()
+    inner = watch.around("inner", lambda: None)
+    watch.around("loop", inner)()
+    assert watch.steps == [{"loop": 1.0 + 2.0, "inner": 3.0}]

@@ -19,6 +19,8 @@ REGISTRY = {
     "race": Entry("the same on the 120 m race with 21 boxes (fig. 11, 12)", "compare"),
     "tableC1": Entry("activation thresholds on the figure-eight, redundancy filter off (Table C.1)", "thresholds"),
     "tableC2": Entry("activation and redundancy thresholds on the figure-eight (Table C.2)", "thresholds"),
+    "table1": Entry("the passage's experts trained from scratch, then its novice (Table I)", "table1"),
+    "table3": Entry("one training lap through the corridor, on the twin of the real robot (Table III)", "corridor"),
     "tableD1": Entry("shared feedback, fixed and flexible, on the figure-eight with boxes (Table D.1)", "sharing"),
     "labels": Entry("densities of the labels of the race by source (fig. E.4, E.5)", "densities"),
     "trajectories": Entry("the final novices' drives on the race (fig. E.6)", "trajectories"),

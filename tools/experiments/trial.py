@@ -17,6 +17,7 @@ from hal.governed import GovernedRobot
 from hal.messages import Action
 from hal.profile import RobotProfile, load_profile
 from sim_backend.catalogue import load_world
+from sim_backend.foresight import sketching
 from sim_backend.twin import Twin
 from tools.assembly import crew, lap, teacher
 from tools.experiments.notes import Notes, Track
@@ -45,8 +46,8 @@ class Trial(msgspec.Struct, frozen=True):
 
     @property
     def profile(self) -> RobotProfile:
-        """The robot of the world's task, at this trial's full speed."""
-        profile = load_profile(TASKS[task_of(self.world)].profile)
+        """The robot of the world's task, at this trial's full speed; without protective field, as the thesis's was."""
+        profile = msgspec.structs.replace(load_profile(TASKS[task_of(self.world)].profile), field=None)
         if self.max_linear_m_s is None:
             return profile
         base = msgspec.structs.replace(profile.base, max_linear_m_s=self.max_linear_m_s)
@@ -85,7 +86,7 @@ def play(trial: Trial) -> Outcome:
     torch.set_num_threads(1)
     profile, world = trial.profile, load_world(trial.world)
     notes = Notes()
-    twin = Twin(profile, world, layout=trial.seed, seed=trial.seed, renderer="tiny")
+    twin = Twin(sketching(profile), world, layout=trial.seed, seed=trial.seed, renderer="tiny")
     robot = GovernedRobot(twin)
     robot.open()
     team = crew(trial.method, profile, trial.seed, InlineTrainer, trial.pair)

@@ -37,6 +37,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add("name", choices=[*REGISTRY, ALL, RESULTS], metavar="NAME", help=f"{names}; {ALL}; {RESULTS}")
     add("--seeds", type=int, default=3, help="repetitions, seeds 0, 1, 2, ... (default: %(default)s)")
     add("--methods", metavar="NAMES", help="of table2 and race, play only these, separated by commas")
+    add(
+        "--experts",
+        metavar="PAIR",
+        help="another pair of experts: TASK@SEED, which is trained first if need be, or a folder with "
+        "camera.safetensors and lidar.safetensors (default: those of the world)",
+    )
     add("--workers", type=int, default=1, help="processes side by side (default: %(default)s)")
     add("--scheduler", metavar="ADDRESS", help="run on this Dask cluster instead, like tcp://192.168.1.5:8786")
     add("--run", type=Path, default=FOLDER, metavar="DIR", help="keeps the trials and pages (default: %(default)s)")
@@ -67,17 +73,25 @@ def run(args: argparse.Namespace) -> int:
 
 def play(args: argparse.Namespace, name: str) -> "tuple[Summary, Path]":
     """Run one experiment; return its summary and its page."""
+    import msgspec
+
     from tools.experiments.page import write_page
     from tools.experiments.pools import Cluster, Here
     from tools.experiments.runner import run_trials
     from tools.experiments.summary import summarise
+    from tools.training import provide
 
     experiment = load(name)
     pool = Here(args.workers) if args.scheduler is None else Cluster(args.scheduler)
     chosen = chosen_methods(args.methods, experiment.methods, name)
     trials = [trial for trial in experiment.trials(args.seeds) if not chosen or trial.method.name in chosen]
+    if args.experts is not None:
+        trials = [msgspec.structs.replace(trial, experts=args.experts) for trial in trials]
+    for pair in dict.fromkeys(trial.pair for trial in trials):
+        provide(pair)
     outcomes = run_trials(trials, args.run, pool)
     command = f"lira experiment {name} --seeds {args.seeds}" + (f" --methods {args.methods}" if chosen else "")
+    command += "" if args.experts is None else f" --experts {args.experts}"
     summary = summarise(name, REGISTRY[name].words, command, args.seeds, experiment, outcomes)
     return summary, write_page(args.run, summary, experiment.figures(outcomes))
 

@@ -5,7 +5,7 @@ ends when the expert alone passes all drives of its curriculum. The experts that
 this command with its defaults.
 
 tasks: line (line-obstacles, race and the figure-eights), passage, garden, corridor; the corridor's lidar expert is the
-garden's. Other pairs, for an experiment's --experts DIR: --out DIR/camera.safetensors, DIR/lidar.safetensors.
+garden's. A pair of one's own for --experts DIR: --out DIR/camera.safetensors and DIR/lidar.safetensors.
 
 examples:
   lira train-expert camera
@@ -34,18 +34,16 @@ def run(args: argparse.Namespace) -> int:
     """Train, measure the cruise action, save. Exit status 1 if the expert did not pass its curriculum."""
     from fusion.expert_files import shipped_path
     from hal.profile import load_profile
-    from tools.training import train_expert
+    from tools.training import command, train_expert
 
-    profile_name = args.profile or TASKS[args.task].profile
-    profile = load_profile(profile_name)
+    profile = load_profile(args.profile or TASKS[args.task].profile)
     path = args.out or shipped_path(args.expert, profile, args.task)
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise StorageError(f"cannot write {path}: {error.strerror}", "Choose another folder.") from error
-    words = "" if args.task == DEFAULT else f" --task {args.task}"
-    command = f"lira train-expert {args.expert}{words} --profile {profile_name} --seed {args.seed}"
-    passed = train_expert(args.expert, args.task, profile, args.seed, path, command)
+    how = command(args.expert, args.task, profile, args.seed)
+    passed = train_expert(args.expert, args.task, profile, args.seed, path, how)
     if not passed:
         raise LiraError("the expert did not pass its curriculum; nothing was saved", "Try another --seed.")
     return 0
