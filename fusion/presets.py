@@ -11,11 +11,12 @@ from fusion.cloning import CloningSettings
 from fusion.hg_dagger import HgDaggerSettings
 from fusion.lira import PRESETS, LiraSettings
 from fusion.novice import LearningSettings
+from fusion.plus import PlusSettings
 from fusion.shared_feedback import SharingSettings
 from fusion.switching import SwitchingSettings
 from hal.errors import ConfigError
 
-Approach = LiraSettings | HgDaggerSettings | CloningSettings | SwitchingSettings
+Approach = LiraSettings | PlusSettings | HgDaggerSettings | CloningSettings | SwitchingSettings
 Sensor = Literal["camera", "lidar"]
 
 
@@ -43,6 +44,7 @@ class Method(msgspec.Struct, frozen=True):
 
 _HOLD = PRESETS["hold"]
 _HG = HgDaggerSettings()
+_HEAVY = LearningSettings(human_weight=3.0)
 _M10 = LearningSettings(labels_per_step=10)
 _BOTH: tuple[Sensor, ...] = ("camera", "lidar")
 
@@ -57,6 +59,7 @@ METHODS = {
         Method("thesis-flexible", PRESETS["thesis"], sharing=SharingSettings(when="flexible")),
         Method("hold-scratch", _HOLD, trunks="scratch"),
         Method("hold-mirrored", _HOLD, mirrored=True),
+        Method("plus", PlusSettings(), _HEAVY),
         Method("hg-dagger", _HG),
         Method("hg-dagger-m10", _HG, _M10),
         Method("hg-dagger-warm", _HG, warm=_BOTH),

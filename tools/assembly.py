@@ -15,7 +15,8 @@ from fusion.method import Alone, Expert
 from fusion.method import Method as Driver
 from fusion.networks import CameraNet, FusionNet, LidarNet, Network
 from fusion.novice import Novice, Trainer
-from fusion.presets import Method
+from fusion.plus import LiraPlus, PlusSettings
+from fusion.presets import Approach, Method
 from fusion.session import Apprentice, Drive
 from fusion.shared_feedback import SharedFeedback
 from fusion.switching import Switching, SwitchingSettings
@@ -84,19 +85,33 @@ def apprentice(
         else FusionNet(lidar.trunk.bins, shape.filters, px=shape.px, seed=seed)
     )
     ensemble: EnsembleNet | None = None
-    if isinstance(approach, HgDaggerSettings) and approach.doubt:
-        network = ensemble = EnsembleNet(network, approach.ensemble, seed)
+    members = _ensemble(approach)
+    if members:
+        network = ensemble = EnsembleNet(network, members, seed)
     learner = Learner(network, seed=seed, frozen_trunks=frozen, mirrored=method.mirrored)
     novice = Novice(network, trainer(learner), method.learning)
     warm_up(novice, method.warm, profile, pair)
+    log = None if ensemble is None else DoubtLog(ensemble.opinions)
     match approach:
         case HgDaggerSettings():
-            return HgDagger(novice, None if ensemble is None else DoubtLog(ensemble.opinions))
+            return HgDagger(novice, log)
+        case PlusSettings():
+            return LiraPlus([camera_expert, lidar_expert], novice, approach, profile.period_s, log)
         case CloningSettings():
             return Cloning(novice)
         case LiraSettings():
             lira = LiraSpf([camera_expert, lidar_expert], novice, approach, profile.period_s)
             return lira if method.sharing is None else SharedFeedback(lira, method.sharing)
+
+
+def _ensemble(approach: Approach) -> int:
+    """How many policies an approach asks about its doubt."""
+    match approach:
+        case HgDaggerSettings(doubt=phases) if phases:
+            return approach.ensemble
+        case PlusSettings(sure=float()):
+            return approach.ensemble
+    return 0
 
 
 def experts(profile: RobotProfile, pair: str = DEFAULT) -> list[tuple[Network, Expert]]:

@@ -150,7 +150,10 @@ def teach(args: argparse.Namespace, robot: "RemoteRobot", arena: "Arena", arena_
         raise ConfigError(f"{folder} already holds a run", "Choose another folder with --run.")
     profile = robot.profile
     in_step = partial(ProcessTrainer, adopt_after_s=profile.period_s)  # one period later, whatever it took
-    with DemonstrationLog(folder / LABELS, profile, mirrored=method_of(args).mirrored) as log, RunWriter(folder / RECORD) as record:
+    with (
+        DemonstrationLog(folder / LABELS, profile, mirrored=method_of(args).mirrored) as log,
+        RunWriter(folder / RECORD) as record,
+    ):
         record.write(head(args, profile, world.name))
         team = crew(method_of(args), profile, args.seed, in_step)
         try:
