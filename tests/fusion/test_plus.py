@@ -1,0 +1,282 @@
+"""What `plus` adds to Algorithm 1: pre-fill, reservation, the wheel to an expert, the memory of resolved calls."""
+
+import numpy as np
+import pytest
+
+from fusion.doubt import DoubtLog
+from fusion.journal import Journal
+from fusion.lira import LiraSettings, LiraSpf
+from fusion.memory import NEIGHBOUR, Memory
+from fusion.method import Call, Chooser, Expert
+from fusion.networks import FusionNet
+from fusion.novice import LearningSettings, Novice
+from fusion.plus import LiraPlus, PlusSettings
+from fusion.preprocess import Features
+
+PERIOD_S = 0.2
+BINS = 101
+NETWORK = FusionNet(BINS, 16, seed=3)
+CRUISE, LEFT, RIGHT = (1.0, 0.0), (1.0, 0.8), (1.0, -0.8)
+BARE = PlusSettings(prefill=0, reserve_s=0.0, wheel_s=0.0, recall=None, sure=None)
+
+
+def seen(brightness=0.5, nearness=1.0):
+    rng = np.random.default_rng(int(1e3 * brightness + 1e6 * nearness))
+    scan = np.full(BINS, nearness, np.float32) * rng.uniform(0.99, 1.0, BINS).astype(np.float32)
+    image = np.full((32, 32), brightness, np.float32) * rng.uniform(0.99, 1.0, (32, 32)).astype(np.float32)
+    return Features(scan, image)
+
+
+def elsewhere():
+    """Return something that looks quite different: half of it bright, half of it near."""
+    features = seen()
+    features.scan[: BINS // 2] = 0.1
+    features.image[:, :16] = 0.0
+    return features
+
+
+class Shelf:
+    """A trainer that only collects."""
+
+    pending = False
+
+    def __init__(self):
+        self.labels = []
+
+    def add(self, label):
+        self.labels.append(label)
+
+    def start(self, now_s):
+        pass
+
+    def poll(self, now_s):
+        return None
+
+    def close(self):
+        pass
+
+
+class Scene:
+    """A method with two experts that do as they are told, and the labels it has stored."""
+
+    def __init__(self, settings, *, trained=True, log=None, **learning):
+        self.camera, self.lidar = CRUISE, CRUISE
+        self.shelf = Shelf()
+        self.novice = Novice(NETWORK, self.shelf, LearningSettings(**learning))
+        self.novice.training_steps = int(trained)
+        experts = [Expert("camera", lambda _: self.camera), Expert("lidar", lambda _: self.lidar)]
+        self.method = LiraPlus(experts, self.novice, settings, PERIOD_S, log)
+
+    def step(self, human=None, features=None):
+        proposal = self.method.propose(features or seen())
+        return proposal, self.method.learn(proposal, human)
+
+    def warm(self):
+        """Let the experts' memories fill."""
+        for _ in range(5):
+            self.step()
+
+    @property
+    def sources(self):
+        return [label.source for label in self.shelf.labels]
+
+
+def test_with_everything_off_it_is_lira():
+    scene, script = Scene(BARE), [(CRUISE, CRUISE)] * 5 + [(LEFT, CRUISE), (LEFT, RIGHT), (LEFT, LEFT), (CRUISE, RIGHT)]
+    experts = [Expert("camera", lambda _: scene.camera), Expert("lidar", lambda _: scene.lidar)]
+    plain = LiraSpf(experts, scene.novice, LiraSettings(), PERIOD_S)
+    for scene.camera, scene.lidar in script:
+        ours, theirs = scene.method.propose(seen()), plain.propose(seen())
+        assert ours.choice == theirs.choice
+        assert ours.speed == theirs.speed
+
+
+class TestPrefill:
+    def scene(self):
+        return Scene(PlusSettings(prefill=8, reserve_s=0.0, recall=None), trained=False)
+
+    def test_the_first_expert_drives_and_teaches_while_nobody_else_is_active(self):
+        scene = self.scene()
+        proposal, lesson = scene.step()
+        assert (proposal.choice.driver, proposal.choice.action) == ("camera", CRUISE)
+        assert lesson.stored
+        assert scene.sources == ["camera"]
+
+    def test_another_expert_alone_drives_but_does_not_teach(self):
+        scene = self.scene()
+        scene.warm()
+        scene.lidar = LEFT
+        proposal, lesson = scene.step()
+        assert (proposal.choice.driver, proposal.choice.call) == ("lidar", Call.ATTENTION)
+        assert not lesson.stored
+
+    def test_the_human_is_called_where_they_disagree_and_slowed_down_for(self):
+        scene = self.scene()
+        scene.warm()
+        scene.camera, scene.lidar = LEFT, RIGHT
+        proposal, lesson = scene.step()
+        assert (proposal.choice.driver, proposal.choice.call, lesson.stored) == ("camera", Call.FEEDBACK, False)
+        assert proposal.speed < 1.0
+
+    def test_it_ends_with_so_many_labels(self):
+        scene = self.scene()
+        for _ in range(12):
+            proposal, _ = scene.step()
+        assert proposal.choice.driver != "camera"
+        assert len(scene.shelf.labels) == 8
+
+
+class TestReservation:
+    def scene(self):
+        scene = Scene(PlusSettings(prefill=0, wheel_s=0.0, recall=None))
+        scene.warm()
+        scene.camera = LEFT
+        return scene
+
+    def test_a_label_is_stored_when_nobody_has_objected_for_a_second(self):
+        scene = self.scene()
+        lessons = [scene.step()[1] for _ in range(6)]
+        assert all(lesson.reserved and not lesson.stored for lesson in lessons)
+        assert [len(lesson.settled) for lesson in lessons] == [0, 0, 0, 0, 0, 1]
+        assert scene.sources == ["camera"]
+
+    def test_a_take_over_drops_what_the_expert_has_just_done(self):
+        scene = self.scene()
+        for _ in range(4):
+            scene.step()
+        _, lesson = scene.step(human=RIGHT)
+        assert [settled.stored for settled in lesson.settled] == [False] * 4
+        assert scene.sources == ["human"]
+
+    def test_the_journal_writes_a_label_once_with_what_became_of_it(self, taken):
+        kept = []
+        journal = Journal(keep=kept.append)
+        scene = self.scene()
+        for k in range(6):
+            journal.note(taken(scene, k), phase="train", lap=1, layout=0, training_steps=1)
+        assert [(label.observation, label.source, label.stored) for label in kept] == [(0, "camera", True)]
+        journal.note(taken(scene, 6, human=RIGHT), phase="train", lap=1, layout=0, training_steps=1)
+        assert [label.observation for label in kept] == [0, 6, 1, 2, 3, 4, 5]
+        assert [label.stored for label in kept] == [True, True] + [False] * 5
+        assert journal.ledger.account.stored == {"camera": 1, "human": 1}
+
+
+@pytest.fixture
+def taken():
+    from fusion.control import Step
+    from hal.messages import Applied, Observation, Reason, Source, Twist
+
+    def take(scene, seq, human=None):
+        proposal, lesson = scene.step(human)
+        applied = Applied(Twist(0.0, 0.0), 0.0, Source.POLICY, Reason.OK, (), seq, 0.0)
+        return Step(Observation(seq, seq * PERIOD_S, None, None, None), proposal, applied, lesson, None)
+
+    return take
+
+
+class TestWheel:
+    def scene(self):
+        scene = Scene(PlusSettings(prefill=0, reserve_s=0.0, recall=None, wheel_s=0.6))
+        scene.warm()
+        return scene
+
+    def test_an_expert_that_is_given_the_wheel_drives_and_teaches_for_a_while(self):
+        scene = self.scene()
+        scene.camera, scene.lidar = LEFT, RIGHT
+        assert scene.method.choose("lidar") is None
+        steps = [scene.step()[0] for _ in range(4)]
+        assert [step.choice.driver for step in steps] == ["lidar"] * 3 + ["novice"]
+        assert [step.choice.call for step in steps] == [Call.NONE] * 3 + [Call.FEEDBACK]
+        assert scene.sources == ["lidar"] * 3
+
+    def test_the_human_can_take_it_back(self):
+        scene = self.scene()
+        scene.method.choose("lidar")
+        scene.step()
+        scene.step(human=LEFT)
+        assert scene.step()[0].choice.driver == "novice"
+
+    def test_nobody_else_can_be_chosen(self):
+        scene = self.scene()
+        assert isinstance(scene.method, Chooser)
+        assert "no expert 'sonar'" in scene.method.choose("sonar")
+        assert Scene(BARE).method.offers == {}
+
+    def test_each_time_has_its_number(self):
+        scene = self.scene()
+        given = []
+        for name in ("lidar", "lidar", "camera"):
+            scene.method.choose(name)
+            given += [scene.step()[0].choice.given for _ in range(4)]
+        assert given == [1, 1, 1, 0, 2, 2, 2, 0, 3, 3, 3, 0]
+
+
+def test_the_human_s_labels_weigh_more():
+    scene = Scene(BARE, human_weight=3.0)
+    scene.warm()
+    scene.camera = LEFT
+    scene.step()
+    scene.step(human=RIGHT)
+    assert [(label.source, label.weight) for label in scene.shelf.labels] == [("camera", 1.0), ("human", 3.0)]
+
+
+class TestMemory:
+    def memory(self, interventions=4, states=4):
+        memory = Memory(NETWORK, 0.9)
+        for k in range(interventions):
+            for j in range(states):
+                memory.add(seen(0.5 + 0.001 * k, 0.4 + 0.001 * j))
+            memory.end()
+        return memory
+
+    def test_what_looks_like_several_resolved_states_is_known_and_what_does_not_is_not(self):
+        memory = self.memory()
+        assert len(memory) == 16
+        assert memory.knows(seen(0.5005, 0.4005))
+        assert not memory.knows(elsewhere())
+
+    def test_one_intervention_tells_nothing_about_another(self):
+        assert not self.memory(interventions=1, states=2 * NEIGHBOUR).knows(seen(0.5, 0.4))
+
+    def test_a_call_that_was_answered_before_is_not_made_again(self):
+        scene = Scene(PlusSettings(prefill=0, reserve_s=0.0, wheel_s=0.0))
+        scene.warm()
+        scene.camera, scene.lidar = LEFT, RIGHT
+        assert scene.step()[0].choice.call is Call.FEEDBACK
+        for k in range(4):
+            for j in range(4):
+                scene.step(human=LEFT, features=seen(0.5 + 0.001 * k, 0.4 + 0.001 * j))
+            scene.camera = CRUISE
+            scene.lidar = CRUISE
+            scene.step(features=seen(0.9, 0.9))
+            scene.camera, scene.lidar = LEFT, RIGHT
+        known, _ = scene.step(features=seen(0.5005, 0.4005))
+        assert (known.choice.driver, known.choice.call, known.speed) == ("novice", Call.NONE, 1.0)
+        assert scene.step(features=elsewhere())[0].choice.call is Call.FEEDBACK
+
+
+class TestConfidence:
+    def scene(self, take_overs):
+        """Return a scene whose ensemble disagrees as much as `spread` says: 0.5 whenever the human takes over."""
+        self.spread = 0.5
+        log = DoubtLog(lambda _: np.array([[1.0, -self.spread], [1.0, self.spread]], np.float32))
+        scene = Scene(PlusSettings(prefill=0, reserve_s=0.0, wheel_s=0.0, recall=None, sure=0.25), log=log)
+        scene.warm()
+        for _ in range(take_overs):
+            scene.step(human=LEFT)
+            scene.step()
+        scene.camera, scene.lidar = LEFT, RIGHT
+        return scene
+
+    def test_a_novice_that_is_sure_drives_and_nobody_is_called(self):
+        scene = self.scene(take_overs=4)
+        assert scene.step()[0].choice.call is Call.FEEDBACK
+        self.spread = 0.1
+        proposal, lesson = scene.step()
+        assert (proposal.choice.driver, proposal.choice.call, proposal.speed) == ("novice", Call.NONE, 1.0)
+        assert not lesson.stored
+
+    def test_it_takes_some_take_overs_to_tell(self):
+        scene = self.scene(take_overs=3)
+        self.spread = 0.1
+        assert scene.step()[0].choice.call is Call.FEEDBACK
