@@ -252,3 +252,26 @@ def test_a_robot_that_stopped_by_itself_is_armed_and_driven_on():
     assert lap.passed
     # The second that nothing happened, one step to hear of it and one to arm it.
     assert lap.duration_s < 6.0 / PROFILE.base.max_linear_m_s + 2.0
+
+
+class Wall(Track):
+    """In front of a black box the camera sees nothing; put back it sees again."""
+
+    def __init__(self):
+        super().__init__(finish_m=3.0)
+        self.blind = True
+
+    def reset(self, episode):
+        super().reset(episode)
+        self.blind = len(self.episodes) == 1
+
+    def state(self):
+        return replace(super().state(), clearance_m=0.1 if self.blind else 2.0)
+
+
+def test_who_sees_nothing_before_a_box_has_crashed_into_it():
+    track = Wall()
+    session, laps = school(track)
+    session.show([Drive(Episode(), NEVER_S)])
+    (lap,) = laps()
+    assert (lap.collisions, lap.passed, len(track.episodes)) == (1, False, 2)
