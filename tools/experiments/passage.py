@@ -53,7 +53,7 @@ def alone(name: Sensor, trial: Trial) -> tuple[LapRecord, Track]:
 
 def row(group: Sequence[Outcome]) -> Row:
     """How a preset's novices came by; medians over the seeds."""
-    first = [track for outcome in group for track in outcome.tracks if track.phase == "train" and track.lap == 1]
+    taught = [[track for track in outcome.tracks if track.phase == "train"] for outcome in group]
     return {
         "n": len(group),
         "passed": sum(outcome.result.converged for outcome in group),
@@ -63,7 +63,7 @@ def row(group: Sequence[Outcome]) -> Row:
         "human_labels": median([outcome.result.human_labels for outcome in group]),
         "interventions": median([outcome.result.interventions for outcome in group]),
         "slowed_steps": median([outcome.result.account.slowed_steps for outcome in group]),
-        "slowest_m_s": median([slowest_m_s(track) for track in first]),
+        "slowest_m_s": median([min(map(slowest_m_s, tracks)) for tracks in taught]),
     }
 
 
@@ -77,7 +77,11 @@ def end(record: LapRecord, track: Track) -> str:
     """How a drive ended, in a word."""
     if record.passed:
         return "finished"
-    return "collided" if record.collisions else "lost" if record.lost else f"stood at x = {track.x_mm[-1] / 1000:.1f} m"
+    if record.collisions:
+        return "collided"
+    if record.lost:
+        return f"lost to the {'left' if track.y_mm[-1] > 0 else 'right'}"
+    return f"stood at x = {track.x_mm[-1] / 1000:.1f} m"
 
 
 def side_m(track: Track) -> float | None:
@@ -121,7 +125,7 @@ def findings(outcomes: Outcomes) -> list[Finding]:
     lidar, camera = ends["lidar expert"], ends["camera expert"]
     found = [
         Finding("fig7.lidar", "the lidar expert alone drives into the gap", "yes", lidar, lidar == "collided"),
-        Finding("fig7.camera", "the camera expert alone turns away", "yes", camera, camera == "finished"),
+        Finding("fig7.camera", "the camera expert alone goes round to the right", "yes", camera, camera == "finished"),
     ]
     for each in method_rows(outcomes, row):
         method, n = each["method"], each["n"]
