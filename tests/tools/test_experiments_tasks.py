@@ -49,8 +49,8 @@ def test_table_1_reads_what_the_experts_took_from_their_files(tmp_path):
     assert [finding.agrees for finding in table1.findings(outcomes)] == [True, False]
 
 
-def test_table_1_trains_a_pair_of_every_seed():
-    assert [trial.pair for trial in table1.trials(2)] == ["passage@0", "passage@1"] * 2
+def test_table_1_has_its_experts_trained_anew():
+    assert {trial.pair for trial in table1.trials(2)} == {"passage@0"}
 
 
 def test_an_expert_drives_the_passage_alone():
