@@ -4,7 +4,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 SEEDS := 10
 WORKERS := 2
-BENCHES := twin lockstep latency train preprocess drivers takeover
+BENCHES := twin lockstep latency train preprocess step log drivers takeover
 
 .PHONY: setup demo test check bench results clean
 

@@ -56,15 +56,17 @@ def _passage() -> Curriculum:
 
     Each from a few metres before it: nothing on the open floor between them tells a sensor which way leads on.
     """
-    teacher = msgspec.structs.replace(STRICT, margin_m=0.15, lateral_m=1.5, stray_m=0.5)
-    places = ((10.5, 4.5), (15.3, 7.0), (31.5, 5.0), (37.8, 5.0), (43.5, 7.0), (51.0, 4.5))
+    teacher = msgspec.structs.replace(STRICT, margin_m=0.15, lateral_m=1.5, stray_m=0.3)
+    places = ((10.5, 4.5), (15.3, 7.0), (29.0, 7.3), (37.8, 5.0), (43.5, 7.0), (51.0, 4.5))
     through = [
-        Drive(Episode(0, start_m=start, lateral_m=lateral), limit_s, "stay", final_lateral_m=1.0)
+        Drive(Episode(0, start_m=start, lateral_m=lateral), limit_s, "stay", final_lateral_m=0.8)
         for lateral in (0.0, 0.15, -0.15)
         for start, limit_s in places
     ]
     around = [Drive(Episode(layout, start_m=start), 6.0, "stay") for layout in range(2) for start in (1.0, 22.0)]
-    return Curriculum("passage-train", teacher, (*through, *around), laps=20, cruise_world="passage", cruise_steps=10)
+    open_floor = [Drive(Episode(0, start_m=start), 2.5, "stay", final_lateral_m=0.25) for start in (0.0, 56.0)]
+    drives = (*open_floor, *through, *around)
+    return Curriculum("passage-train", teacher, drives, laps=20, cruise_world="passage", cruise_steps=10)
 
 
 def _garden_camera() -> Curriculum:

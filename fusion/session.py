@@ -18,6 +18,7 @@ from hal.port import Arena, Robot
 PUT_BACK_M = 2.0  # after a crash in training the robot starts again this far before it
 PUT_ON_M = 1.0  # and on an unseen layout this far behind it
 LOST_OBSERVATIONS = 50  # unusable observations in a row that end a session
+BLIND_M = 0.3  # so close to a box the camera may see nothing but that: a crash, and no broken sensor
 
 
 class Apprentice(Method, Protocol):
@@ -180,6 +181,12 @@ class Session:
         stood = False
         while not state.finished and self._robot.now() < end_s:
             step = self._step(method, teacher)
+            if step is None:
+                tally.collisions += 1
+                if phase == "prove":
+                    return
+                self._begin(_after_crash(drive.episode, self._arena.state(), phase), method, teacher)
+                continue
             self._journal.note(
                 step,
                 phase=phase,
@@ -217,7 +224,8 @@ class Session:
         if teacher is not None:
             teacher.reset(episode.layout)
 
-    def _step(self, method: Method, teacher: Teacher | None) -> Step:
+    def _step(self, method: Method, teacher: Teacher | None) -> Step | None:
+        """Return the next step; None where the robot stands before a box and sees nothing. Raises `DeviceError`."""
         for _ in range(LOST_OBSERVATIONS):
             step = self._loop.step(method, teacher)
             if step is None:
@@ -225,6 +233,8 @@ class Session:
             if step.applied.reason in HELD:  # a busy machine was silent for too long; nobody else is here to arm it
                 self._loop.arm()
             return step
+        if self._arena.state().clearance_m < BLIND_M:
+            return None
         raise DeviceError(
             f"{LOST_OBSERVATIONS} observations in a row could not be used; the last: {self._loop.trouble}",
             "Check the lidar and the camera.",

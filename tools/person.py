@@ -18,6 +18,7 @@ from fusion.record import RunWriter
 from fusion.requests import RequestDesk, RequestLine
 from fusion.service import serve
 from fusion.session import Apprentice
+from fusion.tasks import task_of
 from hal.bus import Bus
 from hal.messages import Decision, Episode
 from hal.remote import RemoteArena, RemoteRobot
@@ -31,7 +32,7 @@ Say = Callable[[str], None]
 
 def show_policy(args: argparse.Namespace, robot: RemoteRobot, publish: Publish, say: Say) -> int:
     """Let one policy drive until Ctrl-C."""
-    expert = load_expert(args.policy, robot.profile)
+    expert = load_expert(args.policy, robot.profile, args.experts or task_of(world_of(robot)))
     method, journal, loop = Alone(expert.name, expert.act), Journal(publish=publish), ControlLoop(robot)
     with stop_on_signal() as stop, request_line(robot, args) as line:
         desk = RequestDesk(line, loop, method, journal, say, restart=restarter(robot, args))

@@ -103,3 +103,15 @@ def test_sequences_cover_their_stages_and_stay_in_range(style):
     assert sequences.shape[1:] == (round(sum(STAGES_S) / PERIOD_S), 2)
     assert np.abs(sequences).max() == 1.0
     assert len(np.unique(sequences, axis=0)) == len(sequences)
+
+
+def test_a_hand_turns_a_nimble_robot_no_faster_than_it_is_told():
+    foresight = Foresight(PROFILE, ONE_BOX)
+    twin = Twin(PROFILE, ONE_BOX)
+    twin.reset(Episode(start_m=3.0))
+    full, gentle = (
+        Planner(foresight, "bang-bang", PERIOD_S, follow_line=True, steer=steer).plan(twin.state())[1]
+        for steer in (1.0, 0.3)
+    )
+    assert abs(full) == 1.0
+    assert abs(gentle) == pytest.approx(0.3)

@@ -7,7 +7,7 @@ import pytest
 
 from fusion.control import ControlLoop
 from fusion.journal import Journal
-from fusion.method import Choice, Lesson, Proposal
+from fusion.method import Call, Choice, Lesson, Proposal
 from fusion.record import LapRecord
 from fusion.session import LOST_OBSERVATIONS, PUT_BACK_M, PUT_ON_M, Drive, Session
 from hal.errors import DeviceError
@@ -252,3 +252,90 @@ def test_a_robot_that_stopped_by_itself_is_armed_and_driven_on():
     assert lap.passed
     # The second that nothing happened, one step to hear of it and one to arm it.
     assert lap.duration_s < 6.0 / PROFILE.base.max_linear_m_s + 2.0
+
+
+class Wall(Track):
+    """In front of a black box the camera sees nothing; put back it sees again."""
+
+    def __init__(self):
+        super().__init__(finish_m=3.0)
+        self.blind = True
+
+    def reset(self, episode):
+        super().reset(episode)
+        self.blind = len(self.episodes) == 1
+
+    def state(self):
+        return replace(super().state(), clearance_m=0.1 if self.blind else 2.0)
+
+
+def test_who_sees_nothing_before_a_box_has_crashed_into_it():
+    track = Wall()
+    session, laps = school(track)
+    session.show([Drive(Episode(), NEVER_S)])
+    (lap,) = laps()
+    assert (lap.collisions, lap.passed, len(track.episodes)) == (1, False, 2)
+
+
+class Doubting:
+    """Drives straight on, but from `x_m` on stands and asks until a human has driven once."""
+
+    def __init__(self, track, x_m):
+        self.track, self.x_m, self.asks = track, x_m, True
+
+    def reset(self):
+        self.asks = True
+
+    def update(self, now_s):
+        pass
+
+    def propose(self, features):
+        doubts = self.asks and self.track.state().x_m > self.x_m
+        choice = Choice("novice", (0.0, 0.0), call=Call.FEEDBACK) if doubts else Choice("novice", (1.0, 0.0))
+        return Proposal(features, choice)
+
+    def learn(self, proposal, human):
+        self.asks = self.asks and human is None
+        return Lesson(proposal.choice if human is None else Choice("human", human))
+
+    def policy(self, driver):
+        return {"novice": lambda features: self.propose(features).choice.action}[driver]
+
+
+class Answering(Hand):
+    """Drives for a step whenever it is called."""
+
+    def act(self, state, proposal, policy):
+        return (1.0, 0.0) if proposal.choice.call is Call.FEEDBACK else None
+
+
+def in_doubt(track):
+    records = []
+    robot = GovernedRobot(track)
+    robot.open()
+    loop = ControlLoop(robot, truth=track.state)
+    session = Session(robot, track, loop, Journal(write=records.append), None, lambda _: Doubting(track, 1.0))
+    loop.arm()
+    return session, records
+
+
+def test_a_stop_in_doubt_ends_a_proving_run_for_nobody_is_there_to_answer():
+    session, records = in_doubt(track := Track())
+    assert session.prove([Drive(Episode(), NEVER_S)]) is False
+    lap = records[-1]
+    assert (lap.stops, lap.collisions, lap.passed, lap.training_steps) == (1, 0, False, 0)
+    assert 1.0 < track.state().x_m < 2.0
+
+
+def test_on_an_unseen_layout_the_teacher_answers_and_the_stop_is_counted():
+    session, _ = in_doubt(Track())
+    (lap,) = session.show([Drive(Episode(), NEVER_S)], Answering(steps=0))
+    assert (lap.stops, lap.passed, lap.unassisted) == (1, True, False)
+    (lap,) = session.show([Drive(Episode(), 8.0)])
+    assert (lap.stops, lap.passed) == (1, False)  # it still stands there
+
+
+def test_without_an_apprentice_nobody_can_be_taught():
+    session, _ = in_doubt(Track())
+    with pytest.raises(ValueError, match="nobody to teach"):
+        session.teach([Drive(Episode(), NEVER_S)], Hand(steps=0), 1)

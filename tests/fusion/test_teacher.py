@@ -87,6 +87,13 @@ def test_a_danger_in_between_starts_the_count_anew(crystal):
     assert drive(hand, crystal, "x..x..x....") == "HHHHHHHHH--"
 
 
+def test_it_lets_go_at_once_when_the_method_asks_for_the_wheel(crystal):
+    hand = teacher(crystal, delay_s=0.0)
+    assert drive(hand, crystal, "xx") == "HH"
+    assert drive(hand, crystal, "x", replace(QUIET, relieves=True)) == "-"
+    assert drive(hand, crystal, "x") == "H"  # and takes over again if that went wrong
+
+
 def test_safe_steps_are_a_setting(crystal):
     assert drive(teacher(crystal, delay_s=0.0, safe_steps=1), crystal, "xx...") == "HH---"
 

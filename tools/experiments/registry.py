@@ -20,6 +20,7 @@ REGISTRY = {
     "tableC1": Entry("activation thresholds on the figure-eight, redundancy filter off (Table C.1)", "thresholds"),
     "tableC2": Entry("activation and redundancy thresholds on the figure-eight (Table C.2)", "thresholds"),
     "table1": Entry("the passage's experts trained from scratch, then its novice (Table I)", "table1"),
+    "fig7": Entry("the passage that the camera alone sees closed: novices and experts (fig. 5, 7)", "passage"),
     "table3": Entry("one training lap through the corridor, on the twin of the real robot (Table III)", "corridor"),
     "tableD1": Entry("shared feedback, fixed and flexible, on the figure-eight with boxes (Table D.1)", "sharing"),
     "labels": Entry("densities of the labels of the race by source (fig. E.4, E.5)", "densities"),

@@ -86,7 +86,7 @@ def play(args: argparse.Namespace, name: str) -> "tuple[Summary, Path]":
     chosen = chosen_methods(args.methods, experiment.methods, name)
     trials = [trial for trial in experiment.trials(args.seeds) if not chosen or trial.method.name in chosen]
     if args.experts is not None:
-        trials = [msgspec.structs.replace(trial, experts=args.experts) for trial in trials]
+        trials = [msgspec.structs.replace(each, experts=each.experts or args.experts) for each in trials]
     for pair in dict.fromkeys(trial.pair for trial in trials):
         provide(pair)
     outcomes = run_trials(trials, args.run, pool)

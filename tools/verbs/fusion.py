@@ -9,6 +9,7 @@ examples:
   lira fusion --policy runs/demo-1/novice.safetensors  let a trained novice drive
   lira fusion --method lira --run runs/mine            learn from a person
   lira fusion --method lira --teacher scripted --run runs/taught
+  lira fusion --method lira --experts corridor         in a real corridor
 """
 
 import argparse
@@ -18,6 +19,7 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from fusion.tasks import task_of
 from hal.errors import ConfigError
 from tools.arguments import natural
 
@@ -42,6 +44,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     what = parser.add_mutually_exclusive_group(required=True)
     what.add_argument("--policy", help="drive only: camera-expert, lidar-expert or a .safetensors file")
+    add(
+        "--experts",
+        metavar="PAIR",
+        help="whose experts: a task (line, passage, garden, corridor), TASK@SEED, or a folder with camera.safetensors "
+        "and lidar.safetensors (default: those of a twin's world; line)",
+    )
     what.add_argument(
         "--method",
         help="learn by this method: hold or lira (LIRA-SPF), thesis, hg-dagger, ...; an unknown name lists them all",
@@ -102,10 +110,11 @@ def learn_by_hand(args: argparse.Namespace, robot: "RemoteRobot") -> int:
     from fusion.session import Apprentice
     from fusion.trainer import ProcessTrainer
     from tools.assembly import apprentice
-    from tools.person import learn_from_person
+    from tools.person import learn_from_person, world_of
 
     def make() -> Apprentice:
-        return apprentice(method_of(args), robot.profile, args.seed, ProcessTrainer)
+        pair = args.experts or task_of(world_of(robot))
+        return apprentice(method_of(args), robot.profile, args.seed, ProcessTrainer, pair)
 
     return learn_from_person(args, robot, make, publisher(robot), say)
 
@@ -155,7 +164,7 @@ def teach(args: argparse.Namespace, robot: "RemoteRobot", arena: "Arena", arena_
         RunWriter(folder / RECORD) as record,
     ):
         record.write(head(args, profile, world.name))
-        team = crew(method_of(args), profile, args.seed, in_step)
+        team = crew(method_of(args), profile, args.seed, in_step, args.experts or task_of(world.name))
         try:
             journal = Journal(keep=log.append, write=record.write, publish=publisher(robot))
             loop = ControlLoop(robot, truth=arena.state)

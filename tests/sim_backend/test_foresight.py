@@ -1,0 +1,31 @@
+"""The imagined robot's small picture is what the networks would see of the large one."""
+
+import numpy as np
+import pytest
+
+from fusion.preprocess import gray_image
+from hal.messages import Episode
+from hal.profile import load_profile
+from sim_backend.foresight import sketching
+from sim_backend.twin import Twin
+
+
+@pytest.mark.parametrize("world", ["corridor", "garden"])
+def test_a_sketch_looks_like_the_picture_it_stands_for(world):
+    profile = load_profile("rosbot2")
+    px = profile.features.image_px
+    seen = []
+    for each in (profile, sketching(profile)):
+        twin = Twin(each, world, renderer="tiny")
+        twin.open()
+        twin.reset(Episode(start_m=1.5))
+        seen.append(gray_image(twin.read().image, px))
+        twin.close()
+    difference = np.abs(seen[0] - seen[1])
+    assert difference.mean() < 0.01
+    assert seen[0].std() > 0.05  # there is something to see
+
+
+def test_a_camera_that_is_small_already_is_left_alone():
+    profile = load_profile("thesis-sim")
+    assert sketching(profile) is profile

@@ -1,0 +1,49 @@
+"""Every kind of method, taught for a lap on a short world."""
+
+import pytest
+from short_trials import write_world
+
+from fusion.presets import METHODS
+from fusion.teacher import PERFECT
+from tools.experiments.trial import Trial, play
+
+KINDS = ("hold-fixed", "hold-scratch", "hold-mirrored", "hg-dagger-warm", "hg-dagger-doubt", "cloning", "switching")
+
+
+@pytest.fixture(scope="module")
+def outcomes(tmp_path_factory):
+    world = write_world(tmp_path_factory.mktemp("world"))
+    trials = {name: Trial(METHODS[name], world, 0, "perfect", PERFECT, laps=1, unseen=1) for name in KINDS}
+    return {name: play(trial) for name, trial in trials.items()}
+
+
+def test_all_of_them_end_with_laps_and_a_result(outcomes):
+    for name, outcome in outcomes.items():
+        phases = [lap.phase for lap in outcome.laps]
+        assert phases[-1] == "unseen", name
+        if name != "switching":
+            assert phases[0] == "train", name
+            assert outcome.result.buffer > 0, name
+            assert outcome.result.laps == 1, name
+
+
+def test_by_the_switching_rule_nobody_learns_and_both_experts_drive(outcomes):
+    outcome = outcomes["switching"]
+    assert (outcome.result.buffer, outcome.result.training_steps, outcome.result.laps) == (0, 0, 0)
+    assert [lap.phase for lap in outcome.laps] == ["prove", "unseen"]
+    assert outcome.after(1).phase == "prove"
+    assert {driver for track in outcome.tracks for driver in track.drivers} == {"camera", "lidar"}
+
+
+def test_cloning_is_the_humans_drive_alone_trained_at_the_end_of_the_lap(outcomes):
+    outcome = outcomes["cloning"]
+    assert set(outcome.labels) == {"demonstration"}
+    assert outcome.result.demonstration == outcome.result.buffer == len(outcome.labels["demonstration"])
+    assert outcome.after(1).training_steps == 0  # the lap's record is written before
+    assert outcome.result.training_steps == outcome.result.buffer // 30
+    assert [lap.phase for lap in outcome.laps] == ["train", "prove", "unseen"]
+
+
+def test_a_warm_start_trains_before_the_human_comes(outcomes):
+    assert outcomes["hg-dagger-warm"].result.demonstration == 0
+    assert outcomes["hg-dagger-warm"].result.training_steps > outcomes["hg-dagger-warm"].result.buffer // 30
