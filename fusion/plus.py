@@ -33,7 +33,7 @@ class PlusSettings(Table, frozen=True, tag="plus"):
     reserve_s: float = 1.0  # an expert's label waits so long for the human's objection
     wheel_s: float = 1.0  # an expert that was given the wheel keeps it so long
     recall: float | None = 0.9  # share of resolved ambiguities that the memory knows again (conformal)
-    sure: float | None = 0.1  # in doubt less than in this share of the moments of take-over, the novice is sure
+    sure: float | None = 0.25  # in doubt less than in this share of the moments of take-over, the novice is sure
     ensemble: int = 5
 
 

@@ -26,6 +26,9 @@ REGISTRY = {
     "labels": Entry("densities of the labels of the race by source (fig. E.4, E.5)", "densities"),
     "trajectories": Entry("the final novices' drives on the race (fig. E.6)", "trajectories"),
     "teacher": Entry("perfect, skilled and unskilled teachers, and one fault at a time", "faults"),
+    "ablation": Entry(
+        "what each part of plus is worth, with other experts and seeds than it was chosen on", "ablation"
+    ),
     "variants": Entry("trunks from scratch, mirrored inputs, a stop in doubt: each against its base", "variants"),
 }
 
