@@ -9,6 +9,7 @@ examples:
   lira demo --seed 3 --unseen 5
   lira demo --world race --laps 20 --run runs/race
   lira demo --world passage
+  lira demo --method plus
   lira demo --wire        the drivers of the real robot in between, byte by byte; in real time
 
 exit status: 0 if the robot learned to drive alone, 1 if it did not within its laps, 2 if something went wrong
@@ -43,6 +44,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add = parser.add_argument
     add("--world", help="world by name or .toml file (default: line-obstacles; with --wire lane, which is shorter)")
     add("--profile", help="robot by name or .toml file (default: that of the world's experiment)")
+    add("--method", default="lira", help="way of teaching, as in `lira fusion` (default: %(default)s)")
     add("--seed", type=natural, default=0, help="seeds teacher, training and noise (default: %(default)s)")
     add("--layout", type=natural, default=0, help="layout to learn on (default: %(default)s)")
     add("--laps", type=natural, default=12, help="give up after so many training laps (default: %(default)s)")
@@ -58,6 +60,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Run the demo from start to report."""
     from fusion.expert_files import SHIPPED, expert_path
+    from fusion.presets import method_named
     from fusion.tasks import TASKS, task_of
     from hal.profile import load_profile
     from sim_backend.catalogue import load_world
@@ -67,6 +70,7 @@ def run(args: argparse.Namespace) -> int:
     # What cannot work is refused before anything starts.
     world = args.world or ("lane" if args.wire else "line-obstacles")
     task = task_of(load_world(world).name)
+    method_named(args.method)
     robot = args.profile or TASKS[task].profile
     profile = load_profile(robot)
     for expert in SHIPPED:
@@ -79,7 +83,7 @@ def run(args: argparse.Namespace) -> int:
     name, endpoint = f"demo_{port}", f"127.0.0.1:{port}"
     both = ["--layout", str(args.layout), "--seed", str(args.seed)]
     twin = ["--world", world, "--profile", robot, *both]
-    fusion = [*both, "--name", name, "--connect", endpoint, "--method", "lira", "--teacher", "scripted"]
+    fusion = [*both, "--name", name, "--connect", endpoint, "--method", args.method, "--teacher", "scripted"]
     fusion += ["--run", str(folder), "--train-laps", str(args.laps), "--unseen", str(args.unseen)]
     fusion += ["--as-command", shlex.join(["lira", *sys.argv[1:]])]
     if args.wire:
