@@ -6,6 +6,14 @@ from tools.experiments.experiment import Row
 from tools.experiments.statistics import median_interval, paired_ratios
 from tools.experiments.trial import Outcome
 
+TOTAL = "human_labels and demonstration"
+
+
+def taken(outcome: Outcome, quantity: str) -> float:
+    """A quantity of the result by its name; `TOTAL` is every label that the human gave."""
+    result = outcome.result
+    return float(result.human_labels + result.demonstration if quantity == TOTAL else getattr(result, quantity))
+
 
 def ratio(numerator: Sequence[Outcome], denominator: Sequence[Outcome], quantity: str) -> Row:
     """One quantity of the results over another's: columns `median`, `low`, `high`, `n`, `censored`.
@@ -13,7 +21,7 @@ def ratio(numerator: Sequence[Outcome], denominator: Sequence[Outcome], quantity
     Both are in the order of the same seeds. `censored` counts pairs in which either run met its cap: where that is the
     numerator's, the true ratio is larger.
     """
-    values = paired_ratios(*([getattr(each.result, quantity) for each in group] for group in (numerator, denominator)))
+    values = paired_ratios(*([taken(each, quantity) for each in group] for group in (numerator, denominator)))
     median, low, high = median_interval(values)
     pairs = zip(numerator, denominator, strict=True)
     censored = sum(not (a.result.converged and b.result.converged) for a, b in pairs)
