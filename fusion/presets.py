@@ -44,7 +44,7 @@ class Method(msgspec.Struct, frozen=True):
 
 _HOLD = PRESETS["hold"]
 _HG = HgDaggerSettings()
-_HEAVY = LearningSettings(human_weight=3.0)
+_HEAVY = LearningSettings(labels_per_step=10, human_weight=3.0)
 _M10 = LearningSettings(labels_per_step=10)
 _BOTH: tuple[Sensor, ...] = ("camera", "lidar")
 
@@ -62,10 +62,11 @@ METHODS = {
         Method("plus", PlusSettings(), _HEAVY),
         Method("plus-no-prefill", PlusSettings(prefill=0), _HEAVY),
         Method("plus-no-reserve", PlusSettings(reserve_s=0.0), _HEAVY),
-        Method("plus-no-weight", PlusSettings()),
+        Method("plus-no-weight", PlusSettings(), _M10),
         Method("plus-no-wheel", PlusSettings(wheel_s=0.0), _HEAVY),
         Method("plus-no-memory", PlusSettings(recall=None), _HEAVY),
         Method("plus-no-confidence", PlusSettings(sure=None), _HEAVY),
+        Method("plus-m30", PlusSettings(), LearningSettings(human_weight=3.0)),
         Method("hg-dagger", _HG),
         Method("hg-dagger-m10", _HG, _M10),
         Method("hg-dagger-warm", _HG, warm=_BOTH),
