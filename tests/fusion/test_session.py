@@ -305,7 +305,7 @@ class Doubting:
 class Answering(Hand):
     """Drives for a step whenever it is called."""
 
-    def act(self, state, proposal, policy):
+    def act(self, state, proposal, policy, offers):
         return (1.0, 0.0) if proposal.choice.call is Call.FEEDBACK else None
 
 

@@ -156,7 +156,7 @@ def test_a_grazing_pass_is_no_collision():
 
 
 def test_leaving_the_line_is_noticed_and_latches():
-    robot = body(KINEMATIC)
+    robot = body(KINEMATIC, "line")
     robot.put_down(10.0, 0.0, math.pi / 2)
     robot.command(Twist(1.0, 0.0))
     robot.advance(1.4)
