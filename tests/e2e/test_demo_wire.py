@@ -59,5 +59,4 @@ def test_the_teacher_and_what_it_taught_drove_the_course_through_the_wire(demo):
     # It moved for nearly all of the time: nobody had to wait for a device, or for a command that came late.
     assert sum(step.decision.driver == "none" for step in steps) < 0.2 * len(steps)
     assert "serves (thesis-sim)" in output
-    assert "the robot stands" not in (run / "robot.log").read_text()
     assert not list((run / "wire").iterdir())

@@ -60,7 +60,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Run the demo from start to report."""
     from fusion.expert_files import SHIPPED, expert_path
-    from fusion.presets import method_named
     from fusion.tasks import TASKS, task_of
     from hal.profile import load_profile
     from sim_backend.catalogue import load_world
@@ -70,7 +69,6 @@ def run(args: argparse.Namespace) -> int:
     # What cannot work is refused before anything starts.
     world = args.world or ("lane" if args.wire else "line-obstacles")
     task = task_of(load_world(world).name)
-    method_named(args.method)
     robot = args.profile or TASKS[task].profile
     profile = load_profile(robot)
     for expert in SHIPPED:
@@ -78,6 +76,9 @@ def run(args: argparse.Namespace) -> int:
     for package, extra in {**NEEDED, **(NEEDED_BY_WIRE if args.wire else {})}.items():
         if find_spec(package) is None:
             raise MissingExtraError(package, extra)
+    from fusion.presets import method_named  # not sooner: it takes the learner's libraries
+
+    method_named(args.method)
     folder: Path = args.run or Path("runs") / f"demo-{datetime.now():%Y%m%d-%H%M%S}"
     port = free_port()
     name, endpoint = f"demo_{port}", f"127.0.0.1:{port}"
