@@ -341,3 +341,10 @@ def test_the_screenshot_is_made_without_a_screen_and_without_a_robot(tmp_path):
     with ChildProcess("the console", lira_command("console", "--screenshot", str(path)), tmp_path / "log") as console:
         assert console.wait(60.0) == 0, console.output()
     assert pygame.image.load(str(path)).get_size() == SIZE
+
+
+def test_a_screenshot_that_cannot_be_written_is_an_error_of_two_lines(tmp_path):
+    path = tmp_path / "nowhere" / "console.png"
+    with ChildProcess("the console", lira_command("console", "--screenshot", str(path)), tmp_path / "log") as console:
+        assert console.wait(60.0) == 2, console.output()
+        assert console.output().splitlines()[0] == f"lira console: cannot write {path}"

@@ -8,6 +8,7 @@ from dataclasses import replace
 
 import pygame
 
+from hal.errors import StorageError
 from hal.messages import Request
 from tools.console import sound
 from tools.console.draw import SIZE, draw
@@ -78,12 +79,15 @@ class Keyboard:
 
 
 def save_picture(view: View, path: str) -> None:
-    """Draw one view without a screen and write it."""
+    """Draw one view without a screen and write it. Raises `StorageError` if it cannot be written."""
     os.environ.setdefault("SDL_VIDEODRIVER", "dummy")
     pygame.font.init()
     surface = pygame.Surface(SIZE)
     draw(surface, view)
-    pygame.image.save(surface, path)
+    try:
+        pygame.image.save(surface, path)
+    except (pygame.error, OSError) as error:
+        raise StorageError(f"cannot write {path}", "Name a .png file in a folder that may be written.") from error
 
 
 def show(look: Callable[[], View], keyboard: Keyboard | None, stop: threading.Event) -> None:
