@@ -14,6 +14,7 @@ examples:
 """
 
 import argparse
+import os
 from pathlib import Path
 
 from fusion.tasks import DEFAULT, TASKS
@@ -42,6 +43,8 @@ def run(args: argparse.Namespace) -> int:
         path.parent.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise StorageError(f"cannot write {path}: {error.strerror}", "Choose another folder.") from error
+    if not os.access(path.parent, os.W_OK):
+        raise StorageError(f"cannot write {path}: the folder may not be written", "Choose another folder.")
     how = command(args.expert, args.task, profile, args.seed)
     passed = train_expert(args.expert, args.task, profile, args.seed, path, how)
     if not passed:
