@@ -162,6 +162,8 @@ class Bus:
         self.refusals = refusals or Refusals()
         keys = keys or keys_from_environment()
         self.encrypted = keys is not None
+        for endpoint in (listen, connect):
+            _check_address(endpoint)
         if listen and not (self.encrypted or insecure or _is_loopback(listen)):
             raise ConfigError(
                 f"without keys anybody who reaches {listen} could drive the robot",
@@ -323,6 +325,14 @@ def _is_loopback(endpoint: str) -> bool:
     return host == "localhost" or host == "::1" or host.startswith("127.")
 
 
+def _check_address(endpoint: str | None) -> None:
+    if endpoint is None:
+        return
+    match = re.fullmatch(r"(\[[0-9a-fA-F:.]+\]|[A-Za-z0-9_.-]+):(\d{1,5})", endpoint)
+    if match is None or not 0 < int(match[2]) < 65536:
+        raise ConfigError(f"'{endpoint}' is no address", "Write HOST:PORT, for example 127.0.0.1:7447.")
+
+
 def _links(endpoint: str | None, keys: Keys | None) -> list[str]:
     """One TCP link for what must arrive and one UDP link for what must be new (zenoh picks by reliability).
 
@@ -330,8 +340,5 @@ def _links(endpoint: str | None, keys: Keys | None) -> list[str]:
     """
     if endpoint is None:
         return []
-    match = re.fullmatch(r"(\[[0-9a-fA-F:.]+\]|[A-Za-z0-9_.-]+):(\d{1,5})", endpoint)
-    if match is None or not 0 < int(match[2]) < 65536:
-        raise ConfigError(f"'{endpoint}' is no address", "Write HOST:PORT, for example 127.0.0.1:7447.")
     stream, datagram = ("tcp", "udp") if keys is None else ("tls", "quic")
     return [f"{stream}/{endpoint}?rel=1", f"{datagram}/{endpoint}?rel=0"]

@@ -217,6 +217,13 @@ def test_who_pretends_to_be_the_robot_is_not_believed(folder):
         impostor.close()
 
 
+@pytest.mark.parametrize("listen", ["127.0.0.1", "0.0.0.0", "7447"])
+def test_an_address_without_a_port_is_told_before_keys_are(listen, monkeypatch):
+    monkeypatch.delenv("LIRA_KEYS", raising=False)
+    with pytest.raises(ConfigError, match="is no address"):
+        Bus(NAME, listen=listen)
+
+
 def test_without_keys_a_robot_listens_to_this_machine_only(folder, monkeypatch):
     port = free_port()
     monkeypatch.delenv("LIRA_KEYS", raising=False)
