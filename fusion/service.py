@@ -13,7 +13,7 @@ from fusion.method import Method
 from fusion.requests import RequestDesk
 from hal.messages import Reason
 
-REARM = "press and release the dead-man, or start anew"
+REARM = "press and release the dead-man (the console's space bar is one), or start lira fusion again"
 STOPPED = {
     Reason.NO_COMMAND: "no command reaches it; look whether it still runs",
     Reason.STALE: f"its commands came too late; {REARM}",
