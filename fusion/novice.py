@@ -80,13 +80,16 @@ class Novice:
         keep_always = source == "human" and not self.settings.filter_human
         if not keep_always and is_redundant(action, a_n, threshold):
             return False
-        weight = self.settings.human_weight if source == "human" else 1.0
-        self.remember(Label(features.scan, features.image, action, source, weight))
+        self.remember(Label(features.scan, features.image, action, source, self.weight(source)))
         return True
 
     def leaves_out(self, human: Action) -> bool:
         """Whether the human's action is an idle frame that is to be no label."""
         return self.settings.idle_frames == "skip" and is_rest(human)
+
+    def weight(self, source: str) -> float:
+        """How much a label of this source counts."""
+        return self.settings.human_weight if source == "human" else 1.0
 
     def remember(self, label: Label) -> None:
         """Take in a label that an earlier session stored."""

@@ -57,7 +57,7 @@ def learn_from_person(
             record.write(head(args, profile, world_of(robot)))
             for old in read_demonstrations(folder / LABELS):
                 if old.stored:
-                    novice.remember(Label(old.scan, old.image, old.action, old.source))
+                    novice.remember(Label(old.scan, old.image, old.action, old.source, novice.weight(old.source)))
             journal, loop = Journal(keep=log.append, write=record.write, publish=publish), ControlLoop(robot)
             with stop_on_signal() as stop, request_line(robot, args) as line:
                 desk = RequestDesk(
