@@ -7,7 +7,7 @@ import msgspec
 
 from fusion.session import Drive
 from fusion.tasks import DEFAULT, TASKS
-from fusion.teacher import PERFECT, TeacherSettings
+from fusion.teacher import PERFECT, SKILLED, TeacherSettings
 from hal.messages import Episode
 
 
@@ -29,14 +29,14 @@ class Curriculum:
 STRICT = msgspec.structs.replace(PERFECT, style="proportional")  # experts are to be good: shown without faults
 
 
-def _line_camera() -> Curriculum:
+def _line_camera(teacher: TeacherSettings) -> Curriculum:
     """A lap of the curved line, then starts beside it and askew: the expert has to find its way back (fig. E.2b)."""
     askew = [(0.5, -0.3), (-0.5, 0.3), (0.9, -0.6), (-0.9, 0.6), (0.9, 0.0), (-0.9, 0.0), (0.3, 0.5), (-0.3, -0.5)]
     recoveries = [
         Drive(Episode(0, start_m=3.0 + 4.0 * k, lateral_m=lateral, yaw_rad=yaw), 8.0, "stay", final_lateral_m=0.35)
         for k, (lateral, yaw) in enumerate(askew)
     ]
-    teacher = msgspec.structs.replace(STRICT, lateral_m=0.2)
+    teacher = msgspec.structs.replace(teacher, lateral_m=0.2)
     return Curriculum("line", teacher, (Drive(Episode(0), 300.0), *recoveries), laps=12)
 
 
@@ -102,7 +102,8 @@ def _edge(world: str, askew: Sequence[tuple[float, float]], starts: Sequence[flo
 
 
 CURRICULA = {
-    DEFAULT: {"camera": _line_camera(), "lidar": _line_lidar()},
+    DEFAULT: {"camera": _line_camera(STRICT), "lidar": _line_lidar()},
+    "eight": {"camera": _line_camera(SKILLED)},  # Appendix C is about an expert taught as a person does: bang-bang
     "passage": {"camera": _passage(), "lidar": _passage()},
     "garden": {"camera": _garden_camera(), "lidar": _garden_lidar()},
     "corridor": {"camera": _corridor_camera()},

@@ -23,9 +23,10 @@ Sensor = Literal["camera", "lidar"]
 class Method(msgspec.Struct, frozen=True):
     """A way of teaching by name.
 
-    `trunks`: "frozen" copies of the experts' trunks, or "scratch" (everything is learned). `warm` names the experts
-    that teach the novice what they do on their own training course before any human does. `mirrored` learns every
-    label once more with left and right exchanged. `sharing` adds Appendix D to LIRA-SPF.
+    `trunks`: "frozen" copies of the experts' trunks, or "scratch" (everything is learned). HG-DAgger and cloning know
+    no experts, so they learn from scratch; variants of HG-DAgger that profit from experts say so in their name.
+    `warm` names the experts that teach the novice what they do on their own training course before any human does.
+    `mirrored` learns every label once more with left and right exchanged. `sharing` adds Appendix D to LIRA-SPF.
     """
 
     name: str
@@ -67,14 +68,14 @@ METHODS = {
         Method("plus-no-memory", PlusSettings(recall=None), _HEAVY),
         Method("plus-no-confidence", PlusSettings(sure=None), _HEAVY),
         Method("plus-m30", PlusSettings(), LearningSettings(human_weight=3.0)),
-        Method("hg-dagger", _HG),
-        Method("hg-dagger-m10", _HG, _M10),
+        Method("hg-dagger", _HG, trunks="scratch"),
+        Method("hg-dagger-m10", _HG, _M10, trunks="scratch"),
+        Method("hg-dagger-mirrored", _HG, trunks="scratch", mirrored=True),
+        Method("hg-dagger-doubt", HgDaggerSettings(doubt=("unseen",)), trunks="scratch"),
+        Method("hg-dagger-trunks", _HG),
         Method("hg-dagger-warm", _HG, warm=_BOTH),
         Method("hg-dagger-warm-m10", _HG, _M10, warm=_BOTH),
-        Method("hg-dagger-scratch", _HG, trunks="scratch"),
-        Method("hg-dagger-mirrored", _HG, mirrored=True),
-        Method("hg-dagger-doubt", HgDaggerSettings(doubt=("unseen",))),
-        Method("cloning", CloningSettings(), LearningSettings(filter_human=False)),
+        Method("cloning", CloningSettings(), LearningSettings(filter_human=False), trunks="scratch"),
         Method("switching", SwitchingSettings()),
     )
 }

@@ -17,7 +17,8 @@ class Task:
 
 DEFAULT = "line"
 TASKS = {
-    DEFAULT: Task("thesis-sim", ("line-obstacles", "race", "eight", "eight-obstacles"), lidar=DEFAULT),
+    DEFAULT: Task("thesis-sim", ("line-obstacles", "race", "eight-obstacles"), lidar=DEFAULT),
+    "eight": Task("thesis-sim", ("eight",), lidar=DEFAULT),
     "passage": Task("thesis-sim", ("passage", "passage-train"), lidar="passage"),
     "garden": Task("rosbot2", ("garden", "garden-train"), lidar="garden"),
     "corridor": Task("rosbot2", ("corridor", "corridor-train"), lidar="garden"),

@@ -24,11 +24,17 @@ def test_the_thesis_is_to_the_letter_and_hold_is_the_default():
 def test_what_is_beyond_a_method_is_off_unless_its_name_says_so():
     for name in ("hold", "thesis", "hg-dagger"):
         method = METHODS[name]
-        assert (method.trunks, method.warm, method.mirrored, method.sharing) == ("frozen", (), False, None)
+        assert (method.warm, method.mirrored, method.sharing) == ((), False, None)
         assert method.learning.labels_per_step == 30
     assert METHODS["hg-dagger"].approach == HgDaggerSettings(doubt=())
     assert METHODS["hg-dagger-warm-m10"].learning.labels_per_step == 10
     assert METHODS["hg-dagger-warm-m10"].warm == METHODS["hg-dagger-warm"].warm == ("camera", "lidar")
+
+
+def test_only_who_has_experts_begins_with_their_trunks():
+    frozen = {name for name, method in METHODS.items() if method.trunks == "frozen"}
+    alone = {"hg-dagger", "hg-dagger-m10", "hg-dagger-mirrored", "hg-dagger-doubt", "cloning", "hold-scratch"}
+    assert frozen == set(METHODS) - alone
 
 
 def test_an_unknown_name_lists_the_known_ones():

@@ -109,14 +109,14 @@ def test_the_buffer_of_table_c1_has_to_fall_by_five():
     for second in (100, 300):
         outcomes = []
         for (theta, keep), buffer in zip(thresholds.THESIS_C1, (1000, second, 30, 30), strict=True):
-            for preset in thresholds.HOLD:
+            for preset, experts in thresholds.PLAYED:
                 method = thresholds.method(preset, theta, keep)
                 made = outcome(HOLD, laps=(lap(buffer=buffer // 2), lap(number=2, buffer=buffer)))
-                outcomes.append(msgspec.structs.replace(made, trial=Trial(method, "eight", 0)))
+                outcomes.append(msgspec.structs.replace(made, trial=Trial(method, "eight", 0, experts=experts)))
         found[second] = {finding.key: finding for finding in thresholds.findings(outcomes, "tableC1")}
-    assert found[100]["tableC1.thesis.fall"].agrees
-    assert not found[300]["tableC1.thesis.fall"].agrees
-    assert found[300]["tableC1.thesis.order"].agrees
+    assert found[100]["tableC1.thesis.eight.fall"].agrees
+    assert not found[300]["tableC1.thesis.eight.fall"].agrees
+    assert found[300]["tableC1.thesis.eight.order"].agrees
 
 
 def race():

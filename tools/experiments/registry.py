@@ -29,7 +29,7 @@ REGISTRY = {
     "ablation": Entry(
         "what each part of plus is worth, with other experts and seeds than it was chosen on", "ablation"
     ),
-    "variants": Entry("trunks from scratch, mirrored inputs, a stop in doubt: each against its base", "variants"),
+    "variants": Entry("the experts' trunks, mirrored inputs, a stop in doubt: each against its base", "variants"),
 }
 
 

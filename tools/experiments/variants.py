@@ -11,8 +11,8 @@ WORLD = "line-obstacles"
 QUANTITIES = ("human_labels", "interventions")
 # Base -> what differs from it in one thing.
 VARIANTS = {
-    "hold": ("hold-scratch", "hold-mirrored"),
-    "hg-dagger": ("hg-dagger-scratch", "hg-dagger-mirrored", "hg-dagger-doubt"),
+    "hold": ("hold-mirrored",),
+    "hg-dagger": ("hg-dagger-trunks", "hg-dagger-mirrored", "hg-dagger-doubt"),
 }
 
 

@@ -4,8 +4,9 @@ The scripted teacher drives whenever the young expert would err; only what the t
 ends when the expert alone passes all drives of its curriculum. The experts that come with the project were made by
 this command with its defaults.
 
-tasks: line (line-obstacles, race and the figure-eights), passage, garden, corridor; the corridor's lidar expert is the
-garden's. A pair of one's own for --experts DIR: --out DIR/camera.safetensors and DIR/lidar.safetensors.
+tasks: line (line-obstacles, race, eight-obstacles), eight, passage, garden, corridor. The lidar expert of the eight is
+the line's, that of the corridor the garden's. A pair of one's own for --experts DIR: --out DIR/camera.safetensors and
+DIR/lidar.safetensors.
 
 examples:
   lira train-expert camera
