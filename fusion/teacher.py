@@ -1,7 +1,7 @@
 """The scripted teacher: stands in for the person with the gamepad, faults included.
 
-It sees the simulator's state, looks ahead with the policy that is driving, takes over before a collision, a lost line
-or a standstill, and hands back once that policy has looked safe for a few steps. When called it reacts sooner.
+It sees the simulator's state, looks ahead with the policy that is driving, takes over before a collision, a lost line,
+a drive the wrong way or a standstill, and hands back once that policy has looked safe for a few steps. When called it reacts sooner.
 """
 
 import math
@@ -33,6 +33,7 @@ class TeacherSettings(Table, frozen=True):
     lateral_m: float = 1.0  # further than this from the line is danger
     stray_m: float = 0.45  # and so is this where no box is within `free_m`: there is nothing to drive around
     free_m: float = 1.0
+    back_m: float = 0.2  # and so is to drive so far back along the line within the horizon
     follow_line: bool = True  # False: only the boxes matter, and to go straight on where there is none
     stall: Share = 0.3  # a policy that drives less than this share of full speed over the horizon stands in the way
     wander_rad: float = 0.1  # a larger turn within the horizon, without a box in the way, is wrong then
@@ -120,7 +121,7 @@ class ScriptedTeacher:
         return self._goes_wrong(state, policy)
 
     def _goes_wrong(self, state: CourseState, policy: Policy) -> bool:
-        """Whether the policy would hit something, lose the line or stand within the horizon, at its full speed."""
+        """Whether the policy would hit something, lose the line, turn back or stand, at its full speed."""
         drive = self._foresight.rollout(state, self._seeing(policy), self._steps, self._period_s)
         unsafe = any(
             each.collided
@@ -128,7 +129,13 @@ class ScriptedTeacher:
             or bool(self._off_line(np.asarray(each.lateral_m), np.asarray(each.clearance_m)))
             for each in drive
         )
-        return unsafe or self._stalls(state, drive) or (not self._settings.follow_line and self._wanders(state, drive))
+        follows = self._settings.follow_line
+        aimless = self._turns_back(state, drive) if follows else self._wanders(state, drive)
+        return unsafe or aimless or self._stalls(state, drive)
+
+    def _turns_back(self, state: CourseState, drive: list[CourseState]) -> bool:
+        """Whether the policy drives along the line the wrong way; never where there is no line."""
+        return drive[-1].progress_m < state.progress_m - self._settings.back_m
 
     def _stalls(self, state: CourseState, drive: list[CourseState]) -> bool:
         x_m, y_m = np.array([(each.x_m, each.y_m) for each in (state, *drive)]).T
@@ -152,7 +159,8 @@ class ScriptedTeacher:
         futures = self._foresight.imagine(state, actions, self._period_s)
         close = futures.clearance_m < self._settings.margin_m + 0.1
         far = self._off_line(futures.lateral_m, futures.clearance_m)
-        return bool(close.any() or far.any())
+        back = np.abs(futures.heading_error_rad[:, 0]) > math.pi / 2
+        return bool(close.any() or far.any() or back.any())
 
     def _off_line(self, lateral_m: NDArray[np.float64], clearance_m: NDArray[np.float64]) -> NDArray[np.bool_]:
         settings, off_m = self._settings, np.abs(lateral_m)

@@ -176,14 +176,17 @@ WORLD = World(
         (0.6, 0.0, straight, True),  # beside the line, with nothing to drive around
         (0.3, 0.0, straight, False),
         (0.0, 0.0, lambda _: (0.1, 0.0), True),  # nothing will happen to it, and nothing will come of it
+        (0.0, 3.0, straight, True),  # back to where it came from
     ],
 )
-def test_a_robot_that_strays_from_a_free_line_or_stands_is_in_need_of_help(lateral_m, yaw_rad, policy, wheel):
+def test_a_robot_that_strays_from_a_free_line_turns_back_or_stands_is_in_need_of_help(
+    lateral_m, yaw_rad, policy, wheel
+):
     foresight = Foresight(PROFILE, WORLD)
     hand = ScriptedTeacher(foresight, PROFILE, PERFECT, seed=0)
     hand.reset(0)
     twin = Twin(PROFILE, WORLD)
-    twin.reset(Episode(start_m=0.5, lateral_m=lateral_m, yaw_rad=yaw_rad))
+    twin.reset(Episode(start_m=1.0, lateral_m=lateral_m, yaw_rad=yaw_rad))
     proposal = replace(QUIET, choice=Choice("novice", policy(FEATURES)))
     action = hand.act(twin.state(), proposal, policy)
     foresight.close()
