@@ -63,7 +63,8 @@ class Novice:
         self.stored = 0
         self.training_steps = 0  # finished ones
         self._trainer = trainer
-        self._fresh = 0  # stored since the last training step began
+        self._fresh = 0  # stored since the last training step that m labels brought began
+        self._hurries = False
 
     @property
     def trained(self) -> bool:
@@ -98,14 +99,23 @@ class Novice:
         self._fresh += 1
 
     def update(self, now_s: float) -> None:
-        """Adopt weights that are ready; begin a training step if m new labels are stored. The remainder is carried."""
+        """Adopt weights that are ready; begin a training step if one is due: the remainder of m labels is carried."""
         weights = self._trainer.poll(now_s)
         if weights is not None:
             self.network.load_weights(weights)
             self.training_steps += 1
-        if self._fresh >= self.settings.labels_per_step and not self._trainer.pending:
+        if self._trainer.pending:
+            return
+        if self._fresh >= self.settings.labels_per_step:
             self._fresh -= self.settings.labels_per_step
             self._trainer.start(now_s)
+        elif self._hurries:
+            self._hurries = False
+            self._trainer.start(now_s)
+
+    def hurry(self) -> None:
+        """Ask for a training step beside those that m labels bring, as soon as the trainer is free."""
+        self._hurries = self.stored > 0
 
     def catch_up(self) -> None:
         """Run the training steps that are due, one after the other, and wait for them. The remainder is carried."""

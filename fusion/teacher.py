@@ -1,7 +1,8 @@
 """The scripted teacher: stands in for the person with the gamepad, faults included.
 
 It sees the simulator's state, looks ahead with the policy that is driving, takes over before a collision, a lost line,
-a drive the wrong way or a standstill, and hands back once that policy has looked safe for a few steps. When called it reacts sooner.
+a drive the wrong way or a standstill, and hands back once that policy has looked safe for a few steps. When called it
+reacts sooner.
 """
 
 import math

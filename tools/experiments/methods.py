@@ -4,6 +4,6 @@ from fusion.presets import METHODS
 
 LIRA = tuple(METHODS[name] for name in ("hold", "hold-scratch", "thesis", "plus"))
 HG_DAGGER = tuple(
-    METHODS[name] for name in ("hg-dagger", "hg-dagger-m10", "hg-dagger-trunks", "hg-dagger-warm", "hg-dagger-warm-m10")
+    METHODS[f"hg-dagger{kind}"] for kind in ("", "-m10", "-trunks", "-warm", "-warm-m10", "-warm-m10-mirrored")
 )
 FLOORS = tuple(METHODS[name] for name in ("cloning", "switching"))  # no interaction, no learning
