@@ -1,12 +1,14 @@
 """The learner: reads the robot's sensors, decides five times a second, drives, and learns from whoever helps.
 
-It drives whatever robot has that name on the bus: the twin, or the real one. With --policy it only drives. With
---method it learns: from a person with a gamepad, or, on a twin, from a scripted teacher until the novice drives a lap
-alone. What it learns goes into the --run folder: labels.lira (every label), novice.safetensors, run.jsonl.
+It drives whatever robot has that name on the bus: the twin, or the real one. With --policy it only drives; on a twin,
+with --unseen, through so many layouts, and says how each went. With --method it learns: from a person with a gamepad,
+or, on a twin, from a scripted teacher until the novice drives a lap alone. What it learns goes into the --run folder:
+labels.lira (every label), novice.safetensors, run.jsonl.
 
 examples:
   lira fusion --policy camera-expert                   let one expert drive
   lira fusion --policy runs/demo-1/novice.safetensors  let a trained novice drive
+  lira fusion --policy runs/demo-1/novice.safetensors --layout 100 --unseen 3   through layouts 101 to 103 of a twin
   lira fusion --method lira --run runs/mine            learn from a person
   lira fusion --method lira --teacher scripted --run runs/taught
   lira fusion --method lira --experts corridor         in a real corridor
@@ -15,7 +17,6 @@ examples:
 import argparse
 import signal
 from collections.abc import Callable
-from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -26,7 +27,6 @@ from tools.arguments import natural
 if TYPE_CHECKING:
     from fusion.presets import Method
     from hal.messages import Decision
-    from hal.port import Arena
     from hal.remote import RemoteRobot
 
 ENDPOINT = "127.0.0.1:7447"
@@ -73,7 +73,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         default=12,
         help="scripted teacher: give up after so many laps (default: %(default)s)",
     )
-    add("--unseen", type=natural, default=0, help="then drive so many unseen layouts alone (default: %(default)s)")
+    add(
+        "--unseen",
+        type=natural,
+        default=0,
+        help="(then) drive so many layouts alone, those after --layout (default: %(default)s)",
+    )
     add("--layout", type=natural, default=0, help="layout to learn on, and to reset a twin to (default: %(default)s)")
     add("--seed", type=natural, default=0, help="seeds teacher and training (default: %(default)s)")
     add("--run", type=Path, metavar="DIR", help="folder for what is learned (default: runs/<method>)")
@@ -81,7 +86,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Drive until done or told to stop. Exit status 1 if a taught novice did not pass its proving run."""
+    """Drive until done or told to stop. Exit status 1 if the novice or the policy did not drive alone as it should."""
     import torch
 
     from hal.bus import Bus
@@ -96,13 +101,26 @@ def run(args: argparse.Namespace) -> int:
     try:
         robot.open()
         if args.policy is not None:
-            from tools.person import show_policy
+            return show(args, robot)
+        if args.teacher == "none":
+            return learn_by_hand(args, robot)
+        from tools.arena import teach
 
-            return show_policy(args, robot, publisher(robot), say)
-        return learn_by_hand(args, robot) if args.teacher == "none" else learn_from_script(args, robot)
+        return teach(args, method_of(args), robot, publisher(robot))
     finally:
         robot.close()
         bus.close()
+
+
+def show(args: argparse.Namespace, robot: "RemoteRobot") -> int:
+    """Let a policy drive: through unseen layouts of a twin if it is asked to, else until it is told to stop."""
+    if args.unseen:
+        from tools.arena import examine
+
+        return examine(args, robot, publisher(robot), say)
+    from tools.person import show_policy
+
+    return show_policy(args, robot, publisher(robot), say)
 
 
 def learn_by_hand(args: argparse.Namespace, robot: "RemoteRobot") -> int:
@@ -117,72 +135,6 @@ def learn_by_hand(args: argparse.Namespace, robot: "RemoteRobot") -> int:
         return apprentice(method_of(args), robot.profile, args.seed, ProcessTrainer, pair)
 
     return learn_from_person(args, robot, make, publisher(robot), say)
-
-
-def learn_from_script(args: argparse.Namespace, robot: "RemoteRobot") -> int:
-    """Teach until the novice passes its proving run, then let it drive unseen layouts."""
-    from hal.bus import Bus
-    from hal.remote import RemoteArena
-    from hal.remote_arena import WiredArena
-
-    if args.arena is None:
-        arena = RemoteArena(robot)
-        return teach(args, robot, arena, arena.info)
-    bus = Bus(args.name, connect=args.arena)
-    try:
-        wired = WiredArena(bus, robot)
-        return teach(args, robot, wired, wired.info)
-    finally:
-        bus.close()
-
-
-def teach(args: argparse.Namespace, robot: "RemoteRobot", arena: "Arena", arena_info: bytes) -> int:
-    """Run a whole session with a scripted teacher in an arena."""
-    import msgspec
-
-    from fusion.control import ControlLoop
-    from fusion.demonstrations import DemonstrationLog
-    from fusion.journal import Journal
-    from fusion.record import RunWriter
-    from fusion.session import Session
-    from fusion.teacher import TEACHERS
-    from fusion.trainer import ProcessTrainer
-    from sim_backend.world import World
-    from tools.assembly import crew, lap, teacher
-    from tools.run_folder import LABELS, RECORD, head, snapshot
-
-    world = msgspec.json.decode(arena_info, type=World | None)
-    if world is None:
-        raise ConfigError("a scripted teacher needs a twin to see in", "Use --teacher none with a gamepad here.")
-    folder: Path = args.run or Path("runs") / args.method
-    if (folder / RECORD).exists() or (folder / LABELS).exists():
-        raise ConfigError(f"{folder} already holds a run", "Choose another folder with --run.")
-    profile = robot.profile
-    in_step = partial(ProcessTrainer, adopt_after_s=profile.period_s)  # one period later, whatever it took
-    with (
-        DemonstrationLog(folder / LABELS, profile, mirrored=method_of(args).mirrored) as log,
-        RunWriter(folder / RECORD) as record,
-    ):
-        record.write(head(args, profile, world.name))
-        team = crew(method_of(args), profile, args.seed, in_step, args.experts or task_of(world.name))
-        try:
-            journal = Journal(keep=log.append, write=record.write, publish=publisher(robot))
-            loop = ControlLoop(robot, truth=arena.state)
-            session = Session(robot, arena, loop, journal, team.pupil, team.alone)
-            loop.arm()
-            hand = teacher(TEACHERS[args.teacher], profile, world, args.layout, args.seed)
-            course = [lap(profile, world, args.layout)]
-            if team.pupil is None:
-                converged = session.prove(course)
-            else:
-                converged = session.teach(course, hand, args.train_laps)
-                snapshot(folder, team.pupil.novice, profile, args)()
-            unseen = [lap(profile, world, args.layout + 1 + k) for k in range(args.unseen)]
-            session.show(unseen, hand if team.answered else None)
-            record.write(session.result(converged))
-        finally:
-            team.close()
-    return 0 if converged else 1
 
 
 def method_of(args: argparse.Namespace) -> "Method":

@@ -1,0 +1,112 @@
+"""What takes a twin: a scripted teacher who sees everything, and a policy that drives layouts nobody showed it."""
+
+import argparse
+import contextlib
+from collections.abc import Callable, Iterator
+from functools import partial
+from pathlib import Path
+
+import msgspec
+
+from fusion.control import ControlLoop
+from fusion.demonstrations import DemonstrationLog
+from fusion.experts import load_expert
+from fusion.journal import Journal
+from fusion.method import Alone
+from fusion.presets import Method
+from fusion.record import RunWriter
+from fusion.session import Drive, Session
+from fusion.tasks import task_of
+from fusion.teacher import TEACHERS
+from fusion.trainer import ProcessTrainer
+from hal.bus import Bus
+from hal.errors import ConfigError
+from hal.messages import Decision
+from hal.port import Arena
+from hal.profile import RobotProfile
+from hal.remote import RemoteArena, RemoteRobot
+from hal.remote_arena import WiredArena
+from sim_backend.world import World
+from tools.assembly import crew, lap, teacher
+from tools.progress import Progress
+from tools.run_folder import LABELS, RECORD, head, snapshot
+
+Publish = Callable[[Decision], None]
+
+
+def teach(args: argparse.Namespace, method: Method, robot: RemoteRobot, publish: Publish) -> int:
+    """Teach until the novice passes its proving run, then let it drive unseen layouts. Returns 1 if it did not pass."""
+    folder: Path = args.run or Path("runs") / args.method
+    profile = robot.profile
+    in_step = partial(ProcessTrainer, adopt_after_s=profile.period_s)  # one period later, whatever it took
+    with arena_of(args, robot) as (arena, world):
+        if (folder / RECORD).exists() or (folder / LABELS).exists():
+            raise ConfigError(f"{folder} already holds a run", "Choose another folder with --run.")
+        with (
+            DemonstrationLog(folder / LABELS, profile, mirrored=method.mirrored) as log,
+            RunWriter(folder / RECORD) as record,
+        ):
+            record.write(head(args, profile, world.name))
+            team = crew(method, profile, args.seed, in_step, args.experts or task_of(world.name))
+            try:
+                journal = Journal(keep=log.append, write=record.write, publish=publish)
+                loop = ControlLoop(robot, truth=arena.state)
+                session = Session(robot, arena, loop, journal, team.pupil, team.alone)
+                loop.arm()
+                hand = teacher(TEACHERS[args.teacher], profile, world, args.layout, args.seed)
+                course = [lap(profile, world, args.layout)]
+                if team.pupil is None:
+                    converged = session.prove(course)
+                else:
+                    converged = session.teach(course, hand, args.train_laps)
+                    snapshot(folder, team.pupil.novice, profile, args)()
+                session.show(unseen(args, profile, world), hand if team.answered else None)
+                record.write(session.result(converged))
+            finally:
+                team.close()
+    return 0 if converged else 1
+
+
+def examine(args: argparse.Namespace, robot: RemoteRobot, publish: Publish, say: Callable[[str], None]) -> int:
+    """Let a policy drive the layouts after `args.layout`; after a crash it goes on behind it. Returns 1 for any."""
+    with arena_of(args, robot) as (arena, world):
+        policy = load_expert(args.policy, robot.profile, args.experts or task_of(world.name))
+        progress = Progress()
+        journal = Journal(write=lambda record: _say_if(progress.note(record), say), publish=publish)
+        loop = ControlLoop(robot, truth=arena.state)
+        session = Session(robot, arena, loop, journal, None, lambda _: Alone(policy.name, policy.act))
+        loop.arm()
+        laps = session.show(unseen(args, robot.profile, world))
+    return 0 if all(each.passed for each in laps) else 1
+
+
+@contextlib.contextmanager
+def arena_of(args: argparse.Namespace, robot: RemoteRobot) -> Iterator[tuple[Arena, World]]:
+    """Reach into the twin behind a robot, or behind its devices. Raises `ConfigError` for a robot that is none."""
+    if args.arena is None:
+        remote = RemoteArena(robot)
+        yield remote, _world(remote.info)
+        return
+    bus = Bus(args.name, connect=args.arena)
+    try:
+        wired = WiredArena(bus, robot)
+        yield wired, _world(wired.info)
+    finally:
+        bus.close()
+
+
+def unseen(args: argparse.Namespace, profile: RobotProfile, world: World) -> list[Drive]:
+    """Laps of the layouts after the one that is taught."""
+    return [lap(profile, world, args.layout + 1 + k) for k in range(args.unseen)]
+
+
+def _world(info: bytes) -> World:
+    world = msgspec.json.decode(info, type=World | None)
+    if world is None:
+        raise ConfigError("only a twin shows layouts to a policy or a scripted teacher", "Use a gamepad here.")
+    return world
+
+
+def _say_if(line: str | None, say: Callable[[str], None]) -> None:
+    if line is not None:
+        say(line)
