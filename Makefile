@@ -4,9 +4,11 @@ VENV := .venv
 BIN := $(VENV)/bin
 SEEDS := 10
 WORKERS := 2
+EXPERTS := $(foreach task,line eight passage garden corridor,camera:--task:$(task)) \
+  $(foreach task,line passage garden,lidar:--task:$(task))
 BENCHES := twin lockstep latency train preprocess step log drivers takeover
 
-.PHONY: setup demo test check bench results clean
+.PHONY: setup demo test check bench results experts clean
 
 setup: $(VENV)/.installed
 
@@ -37,6 +39,10 @@ bench: setup
 # Every experiment of the thesis, then RESULTS.md. It goes on where it was stopped.
 results: setup
 	$(BIN)/lira experiment all --seeds $(SEEDS) --workers $(WORKERS)
+
+# The experts that come with the project, from scratch: the same files again, to the bit, on the same kind of processor.
+experts: setup
+	@for expert in $(EXPERTS); do $(BIN)/lira train-expert $$(echo $$expert | tr : ' ') || exit 1; done
 
 clean:
 	rm -rf $(VENV) runs
