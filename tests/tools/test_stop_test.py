@@ -14,7 +14,7 @@ import pytest
 from hal.profile import load_profile
 from tools.cli import main
 from tools.processes import free_port
-from tools.relay import Relay
+from tools.relay import Narrows, Relay
 from tools.stop_test.faults import FAULTS
 from tools.stop_test.journal import Given, JournalWriter, Truth, read_journal
 from tools.stop_test.matrix import run_matrix
@@ -162,15 +162,50 @@ def test_it_delays_doubles_and_swaps(echo):
         assert stream.recv(100) == b""
 
 
+def test_it_loses_what_does_not_get_through(echo):
+    relay, stream, datagrams = echo
+    relay.faults.lost = 1.0
+    datagrams.send(b"lost")
+    datagrams.settimeout(0.3)
+    with pytest.raises(TimeoutError):
+        datagrams.recv(100)
+    relay.faults.lost = 0.0
+    relay.faults.narrow_byte_s = 1000.0
+    began_s = time.monotonic()
+    for _ in range(20):
+        datagrams.send(bytes(50))
+    stream.send(bytes(100))
+    stream.settimeout(5.0)
+    assert stream.recv(100) == bytes(100)
+    assert time.monotonic() - began_s > 0.2
+    datagrams.settimeout(0.5)
+    came = 0
+    with contextlib.suppress(TimeoutError):
+        while datagrams.recv(100):
+            came += 1
+    assert 2 <= came <= 6
+
+
+def test_what_is_narrow_takes_one_after_the_other():
+    narrows = Narrows()
+    assert narrows.pass_s(100, 1000.0, 5.0) == pytest.approx(0.1)
+    assert narrows.queue_s(5.05) == pytest.approx(0.05)
+    assert narrows.pass_s(100, 1000.0, 5.05) == pytest.approx(0.15)
+    assert narrows.queue_s(9.0) == 0.0
+    assert narrows.pass_s(10**9, math.inf, 9.0) == 0.0
+
+
 CI = (
     "hand's bridge killed (kill -9)",
     "black-out of 1 s",
+    "link throttled to 1 kB/s",
     "second commander",
     "lidar freezes",
     "black image",
     "lira fusion frozen (SIGSTOP)",
     "disk full under labels and record",
     "link's process killed (kill -9)",
+    "link's process frozen (SIGSTOP)",
     "robot's process frozen (SIGSTOP)",
     "base's driver hangs",
     "put without a certificate",
