@@ -31,6 +31,9 @@ DEFAULT_ENDPOINT = "127.0.0.1:7447"
 LINKS_PER_PEER = 2
 QUERY_PAUSE_S = 0.1
 POLL_S = 0.0005
+FIRST_S = 0.5  # how long to wait for a robot that is not there yet
+WATCH_S = 3.0
+CLOSE_S = 2.5  # longer than a link that is just being opened takes
 
 
 @dataclass(frozen=True, slots=True)
@@ -191,8 +194,12 @@ class Bus:
                 "Make keys with: lira keys init keys; listen on 127.0.0.1; or say --insecure.",
             )
         self._connection = Connection(
-            lambda: open_session(robot, listen, connect, keys, watch=watch), renewed=connect is not None
+            lambda: open_session(robot, listen, None, keys),
+            None if connect is None else lambda: open_session(robot, None, connect, keys, watch=watch),
         )
+        if connect and not self._connection.wait_up(WATCH_S if watch else FIRST_S) and watch:
+            self.close()
+            raise BusError(f"cannot open the bus at {connect}", "Check the address, and that the robot runs.")
 
     def publisher(self, topic: Topic[M], qos: Qos | None = None) -> Publisher[M]:
         """Declare a publisher; `qos` replaces the table's."""
@@ -301,7 +308,7 @@ class Bus:
         counts = Counter(str(link.zid) for link in self._session.info.links())
         return sum(counts[str(zid)] < LINKS_PER_PEER for zid in self._session.info.peers_zid())
 
-    def close(self, timeout_s: float = 2.0) -> bool:
+    def close(self, timeout_s: float = CLOSE_S) -> bool:
         """Close the session; False if a dead link kept it from closing in time. May be called twice."""
         return self._connection.close(timeout_s)
 

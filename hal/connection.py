@@ -22,7 +22,7 @@ from hal.errors import BusError
 
 T = TypeVar("T")
 LOOK_S = 0.05
-RETRY_S = 1.0
+RETRY_S = 0.2
 EVENTS = 64  # more links than ever are lost between two looks
 
 
@@ -39,27 +39,30 @@ class Declared(Generic[T]):
 
 
 class Connection:
-    """A session from `open_session`. With `renewed` it is replaced when it loses a link, by a thread of its own.
+    """A session, and what is declared on it.
 
-    Nobody waits for that: what is put meanwhile is lost, like anything else on a link that broke.
+    With `connect` a thread keeps connected: it opens sessions with that until one is up, and another when a link of it
+    is lost. Meanwhile there is an `idle` one, which is connected to nobody: what is put then is lost, like anything
+    else on a link that broke, and nobody waits.
     """
 
-    def __init__(self, open_session: Callable[[], zenoh.Session], *, renewed: bool) -> None:
-        self._open = open_session
-        self.session = open_session()
+    def __init__(self, idle: Callable[[], zenoh.Session], connect: Callable[[], zenoh.Session] | None = None) -> None:
+        self._idle = idle
+        self.session = idle()
         self._declared: list[Declared[Any]] = []
         self._lock = threading.Lock()  # over the session and what is declared on it
-        self._closed = threading.Event()
-        self._keeper: threading.Thread | None = None
-        if renewed:
-            self._events = _link_events(self.session)
-            self._keeper = threading.Thread(target=self._keep, name="bus-keeper", daemon=True)
-            self._keeper.start()
+        self._closed, self._up = threading.Event(), threading.Event()
+        if connect is not None:
+            threading.Thread(target=self._keep, args=(connect,), name="bus-keeper", daemon=True).start()
 
     @property
     def closed(self) -> bool:
         """Whether it was closed, for good."""
         return self._closed.is_set()
+
+    def wait_up(self, timeout_s: float) -> bool:
+        """Wait until it was connected once; returns whether it was."""
+        return self._up.wait(timeout_s)
 
     def declare(self, make: Callable[[zenoh.Session], T]) -> Declared[T]:
         """Declare something, on this session and on all that replace it."""
@@ -70,42 +73,37 @@ class Connection:
 
     def close(self, timeout_s: float) -> bool:
         """Close for good; False if a dead link kept it from closing in time. May be called twice."""
-        self._closed.set()
-        closer = threading.Thread(target=self._close, daemon=True, name="bus-close")
+        with self._lock:
+            self._closed.set()
+        closer = threading.Thread(target=_let_go, args=(self.session,), daemon=True, name="bus-close")
         closer.start()
         closer.join(timeout_s)
         return not closer.is_alive()
 
-    def _close(self) -> None:
-        if self._keeper is not None:
-            self._keeper.join()
-        self.session.close()  # type: ignore[no-untyped-call]  # zenoh's stub
-
-    def _keep(self) -> None:
-        while not self._closed.wait(LOOK_S):
-            if _lost_a_link(self._events):
-                self._renew()
-
-    def _renew(self) -> None:
-        """Replace the session, as soon as there is another to be had."""
-        while True:
+    def _keep(self, connect: Callable[[], zenoh.Session]) -> None:
+        while not self._closed.is_set():
             try:
-                session = self._open()
-                break
-            except BusError:  # a watching session does not open before somebody is there
-                if self._closed.wait(RETRY_S):
-                    return
+                session = connect()
+            except BusError:
+                self._closed.wait(RETRY_S)
+                continue
+            events = session.info.declare_link_events_listener(RingChannel(EVENTS))
+            self._replace(session)
+            self._up.set()
+            while not self._closed.wait(LOOK_S):
+                if _lost_a_link(events):
+                    self._replace(self._idle())
+                    break
+
+    def _replace(self, session: zenoh.Session) -> None:
         with self._lock:
-            old, self.session = self.session, session
-            self._events = _link_events(session)
-            for declared in self._declared:
-                declared.move(session)
+            before = session if self._closed.is_set() else self.session
+            if before is not session:
+                self.session = session
+                for declared in self._declared:
+                    declared.move(session)
         # It may take long while links are dead.
-        threading.Thread(target=_let_go, args=(old,), daemon=True, name="bus-let-go").start()
-
-
-def _link_events(session: zenoh.Session) -> Any:
-    return session.info.declare_link_events_listener(RingChannel(EVENTS))
+        threading.Thread(target=_let_go, args=(before,), daemon=True, name="bus-let-go").start()
 
 
 def _lost_a_link(events: Any) -> bool:

@@ -1,4 +1,9 @@
-"""Opens a zenoh session as a robot or its peer needs it."""
+"""Opens a zenoh session as a robot or its peer needs it.
+
+zenoh sends what must arrive over the datagram link, too, while that is the only one: what two ends declare to each
+other when they meet would be lost with a datagram, for good. So the stream comes first. A session that connects opens
+when its stream is up, or not at all; the datagrams follow in the background, as soon as they get through.
+"""
 
 import json
 
@@ -9,23 +14,26 @@ from hal.keys import Keys
 
 LEASE_MS = 2000
 OPEN_MS = 2000
+CONNECT_MS = 3000
 
 
 def open_session(
-    robot: str, listen: str | None, connect: str | None, keys: Keys | None, *, watch: bool
+    robot: str, listen: str | None, connect: str | None, keys: Keys | None, *, watch: bool = False
 ) -> zenoh.Session:
-    """Open one; the arguments are those of `hal.bus.Bus`. Raises `BusError`."""
+    """Open one; the arguments are those of `hal.bus.Bus`. With neither address it is connected to nobody.
+
+    Raises `BusError`: if it does not connect, after `CONNECT_MS` at the latest.
+    """
     config = zenoh.Config()
     for key, value in {
         # Both ends are peers: a client would use one link only. What peers say is passed on to clients alone.
         "mode": "client" if watch else "peer",
-        "listen/endpoints": _links(listen, keys),
-        "connect/endpoints": _links(connect, keys),
-        # A peer tries for ever, in the background; a client gives up at once if nobody is there.
-        "connect/timeout_ms": 0 if watch else -1,
-        "connect/exit_on_failure": watch,
+        "listen/endpoints": [] if listen is None else _links(listen, keys),
+        "connect/endpoints": [] if connect is None else _connecting(_links(connect, keys), watch=watch),
+        "connect/timeout_ms": CONNECT_MS,
+        "connect/exit_on_failure": False,
         "connect/retry": {"period_init_ms": 200, "period_max_ms": 1000, "period_increase_factor": 2},
-        # Do not wait for links: whoever opens watches them from the first on.
+        # Do not wait for the datagrams: whoever opens watches links from the first on.
         "scouting/delay": 0,
         "scouting/multicast/enabled": False,
         "scouting/gossip/enabled": False,
@@ -55,12 +63,15 @@ def open_session(
         ) from error
 
 
-def _links(endpoint: str | None, keys: Keys | None) -> list[str]:
+def _links(endpoint: str, keys: Keys | None) -> tuple[str, str]:
     """One TCP link for what must arrive and one UDP link for what must be new (zenoh picks by reliability).
 
     With keys these are TLS, and the datagrams of QUIC.
     """
-    if endpoint is None:
-        return []
     stream, datagram = ("tcp", "udp") if keys is None else ("tls", "quic")
-    return [f"{stream}/{endpoint}?rel=1", f"{datagram}/{endpoint}?rel=0"]
+    return f"{stream}/{endpoint}?rel=1", f"{datagram}/{endpoint}?rel=0"
+
+
+def _connecting(links: tuple[str, str], *, watch: bool) -> list[str]:
+    stream, datagram = links
+    return [stream] if watch else [f"{stream}#exit_on_failure=true", datagram]

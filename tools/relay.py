@@ -61,6 +61,7 @@ class Relay:
         self.faults = LinkFaults()
         self._ports = port, target_port
         self.to_robot, self.from_robot = Narrows(), Narrows()
+        self.chance = random.Random(0)
         self._loop = asyncio.new_event_loop()
         self._ready = threading.Event()
         self._streams: set[asyncio.StreamWriter] = set()
@@ -159,14 +160,14 @@ class _Front(asyncio.DatagramProtocol):
 
     def datagram_received(self, data: bytes, addr: tuple[str, int]) -> None:
         if addr not in self._far:
-            self._far[addr] = _Sender(self._relay.faults, self._relay.to_robot)
+            self._far[addr] = _Sender(self._relay, self._relay.to_robot)
             self._relay.start(self._connect(addr, data))
         else:
             self._far[addr].send(data)
 
     async def _connect(self, addr: tuple[str, int], first: bytes) -> None:
         loop = asyncio.get_running_loop()
-        back = _Sender(self._relay.faults, self._relay.from_robot)
+        back = _Sender(self._relay, self._relay.from_robot)
         back.open(lambda data: self._near.sendto(data, addr))
         there, _ = await loop.create_datagram_endpoint(
             lambda: _Back(back), remote_addr=("127.0.0.1", self._target_port)
@@ -189,10 +190,9 @@ class _Back(asyncio.DatagramProtocol):
 class _Sender:
     """Sends datagrams one way, as badly as asked."""
 
-    def __init__(self, faults: LinkFaults, narrows: Narrows) -> None:
-        self._faults = faults
+    def __init__(self, relay: Relay, narrows: Narrows) -> None:
+        self._faults, self._chance = relay.faults, relay.chance
         self._narrows = narrows
-        self._chance = random.Random(0)
         self._put: Callable[[bytes], None] | None = None
         self._held: bytes | None = None
 

@@ -95,6 +95,40 @@ def test_what_is_latched_stays_so_on_the_next_link():
     assert robot.close()
 
 
+def test_however_many_datagrams_are_lost_at_the_beginning_both_ends_hear_each_other_afterwards():
+    name, front, behind = new_name(), new_endpoint(), new_endpoint()
+    robot = Bus(name, listen=behind)
+    applied, commands = robot.publisher(APPLIED), robot.reader(CMD_VEL)
+    ports = [int(endpoint.rpartition(":")[2]) for endpoint in (front, behind)]
+    with relay.Relay(*ports) as between:
+        clients = []
+        for _ in range(20):
+            between.faults.lost = 0.4
+            clients.append(client := Bus(name, connect=front))
+            results, command = client.reader(APPLIED), client.publisher(CMD_VEL)
+            time.sleep(0.05)
+            between.faults.lost = 0.0
+            assert hears(applied, Applied(STOP, 0.0), results)
+            assert hears(command, Twist(0.1, 0.0), commands)
+        for session in (*clients, robot):
+            session.close(0.0)  # some still wait for their datagrams
+
+
+def test_datagrams_that_do_not_get_through_at_first_do_so_later():
+    name, front, behind = new_name(), new_endpoint(), new_endpoint()
+    robot = Bus(name, listen=behind)
+    ports = [int(endpoint.rpartition(":")[2]) for endpoint in (front, behind)]
+    with relay.Relay(*ports) as between:
+        between.faults.lost = 1.0
+        client = Bus(name, connect=front)
+        assert client.links() == 1
+        assert hears(robot.publisher(APPLIED), Applied(STOP, 0.0), client.reader(APPLIED))
+        between.faults.lost = 0.0
+        wait_for(lambda: client.links() == robot.links() == 2)
+    assert client.close()
+    assert robot.close()
+
+
 def test_whoever_connects_too_early_keeps_trying():
     name, endpoint = new_name(), new_endpoint()
     client = Bus(name, connect=endpoint)
