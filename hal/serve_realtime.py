@@ -15,7 +15,7 @@ from hal.desk import Desk
 from hal.errors import SensorError
 from hal.governed import GovernedRobot
 from hal.inlet import Inlet
-from hal.messages import Applied, Observation
+from hal.messages import Applied, Observation, Reason
 from hal.outlet import Outlet
 from hal.port import Arena
 from hal.topics import APPLIED, SIM_STATE
@@ -38,6 +38,7 @@ class CommandLoop:
     def run(self, stop: threading.Event) -> None:
         """Obey and watch until `stop` is set; leaves the wheels at zero, whatever happens."""
         watch_s = publish_s = time.monotonic()
+        told: Reason | None = None
         try:
             while not stop.wait(POLL_S):
                 now_s = time.monotonic()
@@ -46,8 +47,9 @@ class CommandLoop:
                     continue
                 watch_s = now_s + WATCHDOG_S
                 applied = self._robot.tick()
-                if commanded or now_s >= publish_s:
+                if commanded or applied.reason is not told or now_s >= publish_s:
                     publish_s = now_s + 1.0 / APPLIED.rate_hz
+                    told = applied.reason
                     self._herald.offer(applied)
         finally:
             self._robot.halt()
