@@ -11,6 +11,7 @@ from itertools import groupby
 
 import pytest
 
+from hal.messages import Reason
 from hal.profile import load_profile
 from tools.cli import main
 from tools.processes import free_port
@@ -24,13 +25,14 @@ from tools.stop_test.verdict import judge, summarize
 PROFILE = load_profile("rosbot2")
 
 
-def drive(until_s, *, age_s=0.02, again_s=None, stop_s=None):
+def drive(until_s, *, age_s=0.02, again_s=None, stop_s=None, reason=Reason.STALE):
     """A journal at 50 Hz: motion until a time, then zero, and perhaps motion again."""
     given, truth, x_m = [], [], 0.0
     for step in range(100):
         now_s = step * 0.02
         moving = now_s < until_s or (again_s is not None and now_s >= again_s)
-        given.append(Given(now_s, 0.2 if moving else 0.0, 0.0, min(age_s, now_s) if moving else math.nan))
+        pair = (0.2 if moving else 0.0, 0.0)
+        given.append(Given(now_s, *pair, min(age_s, now_s) if moving else math.nan, Reason.OK if moving else reason))
         speed_m_s = 0.2 if moving and (stop_s is None or now_s < stop_s) else 0.0
         x_m += 0.02 * speed_m_s
         truth.append(Truth(now_s, x_m, 0.0, speed_m_s))
@@ -40,6 +42,7 @@ def drive(until_s, *, age_s=0.02, again_s=None, stop_s=None):
 def test_time_counts_from_the_last_command_that_was_obeyed():
     verdict = judge(*drive(1.3, age_s=0.24), broken_s=1.0, end_s=2.0, profile=PROFILE)
     assert verdict.zero_s == pytest.approx(1.3 - (1.28 - 0.24))
+    assert verdict.fault_to_zero_s == pytest.approx(0.3)
     assert verdict.distance_m == pytest.approx(0.2 * 0.24, abs=0.005)
     assert (verdict.stale_obeyed, verdict.moved_unasked) == (0, False)
 
@@ -54,16 +57,27 @@ def test_what_is_old_and_what_moves_again_is_seen():
 def test_a_robot_that_never_stops_fails_and_one_that_stands_by_itself_does_not():
     never = judge(*drive(9.0), broken_s=1.0, end_s=2.0, profile=PROFILE)
     assert never.zero_s == math.inf
-    assert not summarize("x", "watchdog", [never], 0.35)["passed"]
+    assert not summarize("x", ("watchdog",), [never], 0.35)["passed"]
     given, truth = drive(9.0, stop_s=1.5)
     frozen = [one for one in given if one.time_s <= 1.0]
     guarded = judge(frozen, truth, broken_s=1.0, end_s=2.0, profile=PROFILE)
     assert 0.4 < guarded.zero_s < 0.6
+    assert guarded.stopped_by == "base's guard process"
+
+
+@pytest.mark.parametrize(
+    ("reason", "word"), [(Reason.STALE, "watchdog"), (Reason.OK, "zero commanded"), (None, "base's guard process")]
+)
+def test_what_stopped_it_is_what_the_governor_noted_and_another_stop_than_expected_fails(reason, word):
+    verdict = judge(*drive(1.2, reason=reason), broken_s=1.0, end_s=2.0, profile=PROFILE)
+    assert verdict.stopped_by == word
+    assert summarize("x", (word,), [verdict], 0.35)["passed"]
+    assert not summarize("x", ("e-stop",), [verdict], 0.35)["passed"]
 
 
 def test_a_row_has_the_issues_columns_and_the_worst_decides():
     good, bad = (judge(*drive(s), broken_s=1.0, end_s=2.0, profile=PROFILE) for s in (1.2, 1.9))
-    row = summarize("x", "watchdog", [good, good, bad], good.zero_s + 1e-6)
+    row = summarize("x", ("watchdog",), [good, good, bad], good.zero_s + 1e-6)
     assert row["n"] == 3
     assert row["max_time_to_zero_s"] == max(good.zero_s, bad.zero_s)
     assert set(row) >= {"fault", "p50_s", "p99_s", "distance_m", "stale_obeyed", "moved_unasked"}
@@ -71,20 +85,22 @@ def test_a_row_has_the_issues_columns_and_the_worst_decides():
 
 def test_what_has_to_be_counted_and_is_not_fails():
     quiet = judge(*drive(1.2), broken_s=1.0, end_s=2.0, profile=PROFILE)
-    assert summarize("x", "watchdog", [quiet], 0.35)["passed"]
-    assert not summarize("x", "watchdog", [replace(quiet, refused=1), quiet], 0.35, counted=True)["passed"]
-    assert summarize("x", "watchdog", [replace(quiet, refused=1)], 0.35, counted=True)["passed"]
+    assert summarize("x", ("watchdog",), [quiet], 0.35)["passed"]
+    assert not summarize("x", ("watchdog",), [replace(quiet, refused=1), quiet], 0.35, counted=True)["passed"]
+    assert summarize("x", ("watchdog",), [replace(quiet, refused=1)], 0.35, counted=True)["passed"]
 
 
 def test_a_journal_reads_back_up_to_a_torn_end(tmp_path):
     path = tmp_path / "journal.bin"
     writer = JournalWriter(path)
-    writer.given(Given(1.0, 0.2, 0.0, 0.1))
+    writer.given(Given(1.0, 0.2, 0.0, 0.1, Reason.OK))
+    writer.given(Given(1.1, 0.0, 0.0, 0.2))
     writer.truth(Truth(2.0, 1.0, 2.0, 0.2))
     writer.close()
     with path.open("ab") as file:
         file.write(b"torn")
-    assert read_journal(path, 0.0) == ([Given(1.0, 0.2, 0.0, 0.1)], [Truth(2.0, 1.0, 2.0, 0.2)])
+    given = [Given(1.0, 0.2, 0.0, 0.1, Reason.OK), Given(1.1, 0.0, 0.0, 0.2)]
+    assert read_journal(path, 0.0) == (given, [Truth(2.0, 1.0, 2.0, 0.2)])
     assert read_journal(path, 1.5)[0] == []
 
 

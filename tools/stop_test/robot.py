@@ -18,6 +18,7 @@ import numpy as np
 from hal.bus import Bus
 from hal.governed import GovernedRobot
 from hal.messages import Applied, Image, LaserScan, Observation
+from hal.outlet import compress
 from hal.port import Robot
 from hal.profile import RobotProfile, load_profile
 from hal.refusals import count_refusals
@@ -58,8 +59,9 @@ class BreakableTwin(Twin):
             return replace(seen, scan=held.scan)
         if self.fault == "half a scan" and isinstance(seen.scan, LaserScan):
             return replace(seen, scan=replace(seen.scan, ranges=seen.scan.ranges[: len(seen.scan.ranges) // 2]))
-        if self.fault == "black image" and isinstance(seen.image, Image):
-            return replace(seen, image=replace(seen.image, data=np.zeros_like(seen.image.data)))
+        if self.fault == "black image" and seen.image is not None:
+            black = Image(seen.image.stamp_s, np.zeros((HEIGHT_PX, WIDTH_PX, 3), np.uint8))
+            return replace(seen, image=compress(black, self.profile.camera.encoding))
         return seen
 
 
@@ -88,8 +90,8 @@ class WatchedRobot(GovernedRobot):
 
     def _actuate(self) -> Applied:
         applied = super()._actuate()
-        twist = applied.twist
-        self._journal.given(Given(time.monotonic(), twist.linear_m_s, twist.angular_rad_s, applied.command_age_s))
+        pair = (applied.twist.linear_m_s, applied.twist.angular_rad_s)
+        self._journal.given(Given(time.monotonic(), *pair, applied.command_age_s, applied.reason))
         return applied
 
 
