@@ -8,15 +8,16 @@ from hal.messages import Bool
 from tools.stop_test import acts
 from tools.stop_test.acts import HOUR_S, Act, driver_word, link, mend_link, nothing, put, robot_word
 from tools.stop_test.stands import BY_WORD, CLOCKS, DRIVERS, FUSION, KEYED, LEARNER, LINK, Stand
-from tools.stop_test.verdict import DRIVER, ESTOP, FAREWELL, FIELD, GUARD, REFUSAL, WATCHDOG
+from tools.stop_test.verdict import BASE, DRIVER, ESTOP, FAREWELL, FIELD, GUARD, REFUSAL, WATCHDOG
 
 STOP_BUDGET_S = 0.35
 
 
 @dataclass(frozen=True, slots=True)
 class Fault:
-    """One row: what breaks, for `hold_s`, on which stand, and what stops the robot.
+    """One row: what breaks, for `hold_s`, on which stand, and what may stop the robot.
 
+    `below`: who is left to do it where the governor is not.
     `silence`: the fault alone is to change nothing, so the commander is stopped dead a moment after it, and that is
     measured. `asks`: once mended the commander would rightly ask for more, so it leaves before. `hand`: the commander
     is a person's hand, with a policy that drives on beneath it. `counted`: it has to show up among what was refused.
@@ -28,6 +29,7 @@ class Fault:
     mend: Act = nothing
     hold_s: float = 0.8
     stopped_by: tuple[str, ...] = (WATCHDOG,)
+    below: str = GUARD
     stand: Stand = BY_WORD
     silence: bool = False
     asks: bool = False
@@ -85,6 +87,7 @@ FAULTS = (
           hold_s=1.6, stopped_by=(GUARD,), stand=DRIVERS),
     Fault("robot's process killed (kill -9)", acts.robot_signal(signal.SIGKILL), acts.restart_robot,
           stopped_by=(GUARD,), stand=DRIVERS),
+    Fault("robot's governor hangs", robot_word("governor hangs"), WELL, stopped_by=(BASE,), below=BASE, stand=DRIVERS),
     Fault("base's driver hangs", robot_word("base hangs"), WELL, stopped_by=(GUARD,), stand=DRIVERS),
     Fault("robot's clock an hour ahead", acts.clock("robot", HOUR_S), acts.true_clock("robot"), silence=True,
           stand=CLOCKS),

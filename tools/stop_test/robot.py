@@ -82,13 +82,17 @@ class BreakableDrivers(Rosbot):
 
 
 class WatchedRobot(GovernedRobot):
-    """Notes down what the wheels are given."""
+    """Notes down what the wheels are given. While it `hangs`, so does every thread that needs the governor."""
+
+    hangs = False
 
     def __init__(self, robot: Robot, journal: JournalWriter) -> None:
         super().__init__(robot)
         self._journal = journal
 
     def _actuate(self) -> Applied:
+        while self.hangs:
+            time.sleep(NAP_S)
         applied = super()._actuate()
         pair = (applied.twist.linear_m_s, applied.twist.angular_rad_s)
         self._journal.given(Given(time.monotonic(), *pair, applied.command_age_s, applied.reason))
@@ -106,7 +110,10 @@ def main(name: str, endpoint: str, profile_name: str, journal_path: str, ear_por
     profile, journal = small_pictures(load_profile(profile_name)), JournalWriter(Path(journal_path))
     robot = open_drivers(profile, *devices) if devices else BreakableTwin(profile)
 
+    watched = WatchedRobot(robot, journal)
+
     def hear(word: str) -> None:
+        watched.hangs = word == "governor hangs"
         if word == "main hangs":
             signal.pthread_kill(threading.main_thread().ident or 0, signal.SIGUSR1)
         elif word == "what time":
@@ -129,7 +136,7 @@ def main(name: str, endpoint: str, profile_name: str, journal_path: str, ear_por
                     threading.Thread(target=keep_truth, args=(twin, journal), daemon=True).start()
                 print(READY, flush=True)
 
-            HalServer(WatchedRobot(robot, journal), bus, twin, ready=ready).run(stop)
+            HalServer(watched, bus, twin, ready=ready).run(stop)
     finally:
         bus.close()
 

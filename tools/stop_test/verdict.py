@@ -15,10 +15,11 @@ STILL_M_S = 1e-6
 TICK_S = 0.02  # the watchdog may look this much after the time-out
 NOTED_S = 0.03  # the governor notes what it gave this much after the wheels had it, at most
 
-# What may stop a robot, by the governor's reason; None: the wheels had zero and the governor knows nothing of it.
+# What may stop a robot, by the governor's reason.
 WATCHDOG, REFUSAL, ESTOP, FIELD = "watchdog", "refusal", "e-stop", "protective field"
-DRIVER, FAREWELL, GUARD = "zero commanded", "commander left", "base's guard process"
-STOPPERS: dict[Reason | None, str] = {
+DRIVER, FAREWELL = "zero commanded", "commander left"
+GUARD, BASE = "base's guard process", "base driver's watchdog"  # the governor knows nothing of these
+STOPPERS: dict[Reason, str] = {
     Reason.STALE: WATCHDOG,
     Reason.REFUSED: REFUSAL,
     Reason.ESTOP: ESTOP,
@@ -26,7 +27,6 @@ STOPPERS: dict[Reason | None, str] = {
     Reason.OK: DRIVER,
     Reason.NO_COMMAND: FAREWELL,
     Reason.NEUTRAL_FIRST: "stopped before",
-    None: GUARD,
 }
 
 
@@ -52,8 +52,12 @@ def judge(
     broken_s: float,
     end_s: float,
     profile: RobotProfile,
+    below: str = GUARD,
 ) -> Verdict:
-    """Judge what was noted from the fault on. The wheels have zero when told so, or when the body stands by itself."""
+    """Judge what was noted from the fault on. The wheels have zero when told so, or when the body stands by itself.
+
+    `below` is who did it if the governor knows nothing of it.
+    """
     after = [one for one in given if one.time_s >= broken_s]
     moving = [one for one in after if one.moving] or [one for one in given if one.moving][-1:]
     if not moving:
@@ -72,16 +76,16 @@ def judge(
         distance_m=distance_m,
         stale_obeyed=sum(one.age_s > limit_s for one in after if one.moving),
         moved_unasked=bool(again),
-        stopped_by=_stopper(after, zero_at_s),
+        stopped_by=_stopper(after, zero_at_s) or below,
     )
 
 
 def _stopper(given: Sequence[Given], zero_at_s: float) -> str:
-    """What gave the first zero: the governor, for a reason that it noted, or somebody else."""
+    """What made the governor give the first zero; "" if it was not the governor."""
     if math.isinf(zero_at_s):
         return "nothing"
-    reasons = [one.reason for one in given if not one.moving and abs(one.time_s - zero_at_s) <= NOTED_S]
-    return STOPPERS[next((reason for reason in reasons if reason is not None), None)]
+    noted = (one.reason for one in given if not one.moving and abs(one.time_s - zero_at_s) <= NOTED_S)
+    return next((STOPPERS[reason] for reason in noted if reason is not None), "")
 
 
 def _still(one: Truth) -> bool:
