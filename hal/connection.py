@@ -14,6 +14,7 @@ import contextlib
 import threading
 from collections.abc import Callable
 from typing import Any, Generic, TypeVar
+from weakref import WeakSet
 
 import zenoh
 from zenoh.handlers import RingChannel
@@ -49,7 +50,7 @@ class Connection:
     def __init__(self, idle: Callable[[], zenoh.Session], connect: Callable[[], zenoh.Session] | None = None) -> None:
         self._idle = idle
         self.session = idle()
-        self._declared: list[Declared[Any]] = []
+        self._declared: WeakSet[Declared[Any]] = WeakSet()  # what nobody uses any more is not declared again
         self._lock = threading.Lock()  # over the session and what is declared on it
         self._closed, self._up = threading.Event(), threading.Event()
         if connect is not None:
@@ -68,7 +69,7 @@ class Connection:
         """Declare something, on this session and on all that replace it."""
         with self._lock:
             declared = Declared(make, self.session)
-            self._declared.append(declared)
+            self._declared.add(declared)
         return declared
 
     def close(self, timeout_s: float) -> bool:
@@ -92,7 +93,8 @@ class Connection:
             self._up.set()
             while not self._closed.wait(LOOK_S):
                 if _lost_a_link(events):
-                    self._replace(self._idle())
+                    with contextlib.suppress(BusError):  # then the lost one stays until the next is up
+                        self._replace(self._idle())
                     break
 
     def _replace(self, session: zenoh.Session) -> None:

@@ -1,5 +1,6 @@
 """A bus whose link breaks and comes back, with the link in a process of its own."""
 
+import gc
 import subprocess
 import sys
 import threading
@@ -77,6 +78,23 @@ def is_answered(client, asked):
     questions[0].answer(b"yes")
     asking.join()
     return answers == [b"yes"]
+
+
+def test_what_nobody_uses_any_more_is_not_declared_again():
+    name, front, behind = new_name(), new_endpoint(), new_endpoint()
+    robot = Bus(name, listen=behind)
+    commands = robot.publisher(CMD_VEL)
+    with relayed(front, behind):
+        client = Bus(name, connect=front)
+        reader, used = client.reader(CMD_VEL), client.reader(APPLIED)
+        wait_for(lambda: commands.matching)
+    del reader
+    gc.collect()
+    with relayed(front, behind):
+        assert hears(robot.publisher(APPLIED), Applied(STOP, 0.0), used)
+        wait_for(lambda: not commands.matching)
+    assert client.close()
+    assert robot.close()
 
 
 def test_what_is_latched_stays_so_on_the_next_link():
