@@ -3,10 +3,8 @@
 Every message carries an attachment. Nothing here calls back: readers are polled, so no topic can stall another.
 """
 
-import json
 import re
 import secrets
-import threading
 import time
 from collections import Counter
 from collections.abc import Callable
@@ -19,9 +17,11 @@ from zenoh.handlers import FifoChannel, RingChannel
 
 from hal.attachment import Attachment, parse_attachment
 from hal.codec import decode, encode
+from hal.connection import Connection, Declared
 from hal.errors import BusError, CodecError, ConfigError
 from hal.keys import Keys, keys_from_environment
 from hal.refusals import Refusals
+from hal.session import open_session
 from hal.topics import Qos, Topic
 
 M = TypeVar("M")
@@ -29,10 +29,11 @@ M = TypeVar("M")
 DEFAULT_ROBOT = "rosbot"
 DEFAULT_ENDPOINT = "127.0.0.1:7447"
 LINKS_PER_PEER = 2
-LEASE_MS = 2000
-OPEN_MS = 2000
 QUERY_PAUSE_S = 0.1
 POLL_S = 0.0005
+FIRST_S = 0.5  # how long to wait for a robot that is not there yet
+WATCH_S = 3.0
+CLOSE_S = 2.5  # longer than a link that is just being opened takes
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,15 +48,21 @@ class Received(Generic[M]):
 class Publisher(Generic[M]):
     """Publishes one topic."""
 
-    def __init__(self, publisher: Any, epoch: int) -> None:
-        self._publisher = publisher
+    def __init__(
+        self, connection: Connection, declare: Callable[[zenoh.Session], Any], epoch: int, *, latched: bool
+    ) -> None:
+        self._connection = connection
+        self._declare = declare
+        self._latched = latched
+        self._kept: tuple[bytes, bytes] | None = None
+        self._publisher = connection.declare(self._anew)
         self._epoch = epoch
         self._seq = 0
 
     @property
     def matching(self) -> bool:
         """Whether anybody listens."""
-        return bool(self._publisher.matching_status.matching)
+        return bool(self._publisher.now.matching_status.matching)
 
     def put(
         self, message: M, time_s: float, *, seq: int | None = None, answers: int = -1, released: bool = False
@@ -65,17 +72,31 @@ class Publisher(Generic[M]):
         Raises `BusError` when the session is closed, `CodecError` for what ROS cannot hold.
         """
         self._seq = self._seq + 1 if seq is None else seq
-        attachment = Attachment(self._epoch, self._seq, round(time_s * 1e9), answers, released)
+        payload = encode(message)
+        attachment = Attachment(self._epoch, self._seq, round(time_s * 1e9), answers, released).to_bytes()
+        if self._latched:
+            self._kept = payload, attachment
         try:
-            self._publisher.put(encode(message), attachment=attachment.to_bytes())
+            self._publisher.now.put(payload, attachment=attachment)
         except zenoh.ZError as error:
+            if not self._connection.closed:
+                return  # its session is just being replaced: lost, like all that was under way on it
             raise BusError(f"the bus does not take messages: {error}", "It is closed: start again.") from error
+
+    def _anew(self, session: zenoh.Session) -> Any:
+        """Declare it on a session, which for a latched topic holds what was put last."""
+        publisher = self._declare(session)
+        if self._kept is not None:
+            payload, attachment = self._kept
+            publisher.put(payload, attachment=attachment)
+        return publisher
 
 
 class Reader(Generic[M]):
     """Keeps the newest of a topic. What cannot be decoded is dropped and counted in `dropped`, by reason."""
 
-    def __init__(self, subscriber: Any, kind: type[M]) -> None:
+    def __init__(self, connection: Connection, subscriber: Declared[Any], kind: type[M]) -> None:
+        self._connection = connection
         self._subscriber = subscriber
         self._kind = kind
         self._newest: Received[M] | None = None
@@ -103,8 +124,10 @@ class Reader(Generic[M]):
 
     def _next(self) -> Any:
         try:
-            return self._subscriber.try_recv()
+            return self._subscriber.now.try_recv()
         except zenoh.ZError as error:
+            if not self._connection.closed:
+                return None  # its session is just being replaced
             raise BusError(f"the bus is closed: {error}", "Open it again.") from error
 
 
@@ -131,7 +154,8 @@ class Bus:
 
     `listen` and `connect` are HOST:PORT; a robot listens, everybody else connects, and whoever connects keeps trying
     in the background. With `keys` (default: those that LIRA_KEYS names) it is encrypted and authenticated both ways;
-    without, it listens on this machine only, unless `insecure`.
+    without, it listens on this machine only, unless `insecure`. Whoever connects and loses a link begins a new session
+    (`connection.py`), with the same `epoch`; what was under way is lost.
 
     Peers hear the robot, not one another. With `watch` a session hears what all of them say, through the robot and
     over one link: for consoles and the like, not for driving; nobody there to connect to is a `BusError` then.
@@ -169,7 +193,13 @@ class Bus:
                 f"without keys anybody who reaches {listen} could drive the robot",
                 "Make keys with: lira keys init keys; listen on 127.0.0.1; or say --insecure.",
             )
-        self._session = _open(robot, listen, connect, keys, watch)
+        self._connection = Connection(
+            lambda: open_session(robot, listen, None, keys),
+            None if connect is None else lambda: open_session(robot, None, connect, keys, watch=watch),
+        )
+        if connect and not self._connection.wait_up(WATCH_S if watch else FIRST_S) and watch:
+            self.close()
+            raise BusError(f"cannot open the bus at {connect}", "Check the address, and that the robot runs.")
 
     def publisher(self, topic: Topic[M], qos: Qos | None = None) -> Publisher[M]:
         """Declare a publisher; `qos` replaces the table's."""
@@ -181,14 +211,15 @@ class Bus:
             "express": qos.express,
             "reliability": qos.reliability,
         }
-        if qos.latched:
+        key = self._key(topic.key)
+
+        def declare(session: zenoh.Session) -> Any:
+            if not qos.latched:
+                return session.declare_publisher(key, **options)
             cache = ext.CacheConfig(max_samples=1)
-            publisher: Any = ext.declare_advanced_publisher(
-                self._session, self._key(topic.key), cache=cache, publisher_detection=True, **options
-            )
-        else:
-            publisher = self._session.declare_publisher(self._key(topic.key), **options)
-        return Publisher(publisher, self.epoch)
+            return ext.declare_advanced_publisher(session, key, cache=cache, publisher_detection=True, **options)
+
+        return Publisher(self._connection, declare, self.epoch, latched=qos.latched)
 
     def put_raw(self, topic: Topic[Any], payload: bytes, attachment: bytes | None = None) -> None:
         """Send bytes as they are: for relays, recorders and tests of what a bus has to bear."""
@@ -202,22 +233,23 @@ class Bus:
 
     def reader(self, topic: Topic[M], depth: int = 1) -> Reader[M]:
         """Declare a reader that keeps the newest `depth` messages between polls."""
-        ring: RingChannel[zenoh.Sample] = RingChannel(depth)
-        if topic.qos.latched:
+        key = self._key(topic.key)
+
+        def declare(session: zenoh.Session) -> Any:
+            ring: RingChannel[zenoh.Sample] = RingChannel(depth)
+            if not topic.qos.latched:
+                return session.declare_subscriber(key, ring)
             history = ext.HistoryConfig(detect_late_publishers=True, max_samples=1)
-            subscriber: Any = ext.declare_advanced_subscriber(
-                self._session, self._key(topic.key), ring, history=history
-            )
-        else:
-            subscriber = self._session.declare_subscriber(self._key(topic.key), ring)
-        return Reader(subscriber, topic.kind)
+            return ext.declare_advanced_subscriber(session, key, ring, history=history)
+
+        return Reader(self._connection, self._connection.declare(declare), topic.kind)
 
     def questions(self, key: str) -> Callable[[], Question | None]:
         """Answer queries on a key: returns a poll that gives the next question or None."""
-        queryable = self._session.declare_queryable(self._key(key), FifoChannel(16))
+        queryable = self._connection.declare(lambda session: session.declare_queryable(self._key(key), FifoChannel(16)))
 
         def poll() -> Question | None:
-            query = queryable.try_recv()
+            query = queryable.now.try_recv()
             return None if query is None else Question(query)
 
         return poll
@@ -248,7 +280,12 @@ class Bus:
 
     def _get(self, key: str, payload: bytes, timeout_s: float) -> zenoh.Reply | None:
         """One query: its first reply, None if nobody is there."""
-        handler = self._session.get(self._key(key), FifoChannel(4), payload=payload, timeout=timeout_s)
+        try:
+            handler = self._session.get(self._key(key), FifoChannel(4), payload=payload, timeout=timeout_s)
+        except zenoh.ZError as error:
+            if not self._connection.closed:
+                return None  # its session is just being replaced
+            raise BusError(f"the bus is closed: {error}", "Open it again.") from error
         while True:
             try:
                 reply = handler.try_recv()
@@ -271,53 +308,16 @@ class Bus:
         counts = Counter(str(link.zid) for link in self._session.info.links())
         return sum(counts[str(zid)] < LINKS_PER_PEER for zid in self._session.info.peers_zid())
 
-    def close(self, timeout_s: float = 2.0) -> bool:
+    def close(self, timeout_s: float = CLOSE_S) -> bool:
         """Close the session; False if a dead link kept it from closing in time. May be called twice."""
-        closer = threading.Thread(target=self._session.close, daemon=True, name="bus-close")
-        closer.start()
-        closer.join(timeout_s)
-        return not closer.is_alive()
+        return self._connection.close(timeout_s)
+
+    @property
+    def _session(self) -> zenoh.Session:
+        return self._connection.session
 
     def _key(self, key: str) -> str:
         return f"{self._prefix}/{key}" if self._prefix else key
-
-
-def _open(robot: str, listen: str | None, connect: str | None, keys: Keys | None, watch: bool) -> zenoh.Session:
-    config = zenoh.Config()
-    for key, value in {
-        # Both ends are peers: a client would use one link only. What peers say is passed on to clients alone.
-        "mode": "client" if watch else "peer",
-        "listen/endpoints": _links(listen, keys),
-        "connect/endpoints": _links(connect, keys),
-        "connect/timeout_ms": 0,
-        "connect/exit_on_failure": False,
-        "connect/retry": {"period_init_ms": 200, "period_max_ms": 1000, "period_increase_factor": 2},
-        "scouting/multicast/enabled": False,
-        "scouting/gossip/enabled": False,
-        "transport/unicast/max_links": 2,
-        # Whoever has no keys for a robot that wants some hears it after this long.
-        "transport/unicast/open_timeout": OPEN_MS,
-        "transport/link/tx/lease": LEASE_MS,
-        # It can lose a message when a receiver stalls.
-        "transport/shared_memory/enabled": False,
-        # Late readers of a latched topic are served by its time stamp.
-        "timestamping/enabled": True,
-        **({} if keys is None else keys.zenoh_config(robot)),
-    }.items():
-        config.insert_json5(key, json.dumps(value))
-    try:
-        return zenoh.open(config)
-    except zenoh.ZError as error:
-        # zenoh nests its reasons in brackets, each with the place in its sources.
-        reason = str(error).split(" at /")[0].split(": [")[-1]
-        if "in use" in reason:
-            raise BusError(
-                f"{listen} is already in use",
-                "Stop the other program (another robot?), or choose another port with --listen HOST:PORT.",
-            ) from error
-        raise BusError(
-            f"cannot open the bus at {listen or connect}: {reason}", "Check the address, and that the robot runs."
-        ) from error
 
 
 def _is_loopback(endpoint: str) -> bool:
@@ -331,14 +331,3 @@ def _check_address(endpoint: str | None) -> None:
     match = re.fullmatch(r"(\[[0-9a-fA-F:.]+\]|[A-Za-z0-9_.-]+):(\d{1,5})", endpoint)
     if match is None or not 0 < int(match[2]) < 65536:
         raise ConfigError(f"'{endpoint}' is no address", "Write HOST:PORT, for example 127.0.0.1:7447.")
-
-
-def _links(endpoint: str | None, keys: Keys | None) -> list[str]:
-    """One TCP link for what must arrive and one UDP link for what must be new (zenoh picks by reliability).
-
-    With keys these are TLS, and the datagrams of QUIC.
-    """
-    if endpoint is None:
-        return []
-    stream, datagram = ("tcp", "udp") if keys is None else ("tls", "quic")
-    return [f"{stream}/{endpoint}?rel=1", f"{datagram}/{endpoint}?rel=0"]

@@ -35,6 +35,14 @@ def info_from_json(data: bytes) -> Info:
         raise BusError(f"the robot says what is not understood: {error}", "Run one version on both sides.") from error
 
 
+def reset_time(answer: bytes) -> float:
+    """Return when a reset happened, from the robot's answer to it. Raises `BusError`."""
+    try:
+        return msgspec.json.decode(answer, type=float)
+    except msgspec.MsgspecError as error:
+        raise BusError(f"the robot says what is not understood: {error}", "Run one version on both sides.") from error
+
+
 class Desk:
     """Answers `info` and, with an arena, `sim/reset`. To be polled by the thread that owns the robot.
 

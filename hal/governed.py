@@ -1,5 +1,6 @@
 """A robot behind its governor: whatever is asked of it, only what the governor allows reaches the wheels."""
 
+import math
 import threading
 from dataclasses import replace
 
@@ -118,7 +119,9 @@ class GovernedRobot:
 
     def _actuate(self) -> Applied:
         allowed = self._governor.tick(self._robot.now())
-        got = self._robot.drive(Command(allowed.twist, allowed.stamp_s, allowed.source, allowed.answers))
+        # The base times it out by itself, from when it was decided, should nobody come back here.
+        decided_s = allowed.stamp_s if math.isnan(allowed.command_age_s) else allowed.stamp_s - allowed.command_age_s
+        got = self._robot.drive(Command(allowed.twist, decided_s, allowed.source, allowed.answers))
         if self._robot.now() - allowed.stamp_s > self.profile.control.robot_timeout_s:
             # The base hung on it: what it took in the end is old by now.
             self._governor.halt()

@@ -3,7 +3,7 @@
 import msgspec
 
 from hal.bus import Bus
-from hal.desk import LOCKSTEP, Info, info_from_json
+from hal.desk import LOCKSTEP, Info, info_from_json, reset_time
 from hal.errors import BusError
 from hal.messages import Applied, Command, CourseState, Episode, Observation
 from hal.profile import RobotProfile
@@ -103,7 +103,7 @@ class RemoteArena:
         """Start afresh, and stand there until the next decision. Raises `BusError` if the twin refuses or is none."""
         self._robot.link.stand()
         answer = self._robot.bus.ask(RESET, msgspec.json.encode(episode), timeout_s=RESET_S)
-        self._robot.link.refresh(msgspec.json.decode(answer, type=float))
+        self._robot.link.refresh(reset_time(answer))
 
     def state(self) -> CourseState:
         """Ground truth now. Raises `BusError` if none comes."""

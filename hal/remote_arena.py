@@ -7,7 +7,7 @@ import msgspec
 
 from hal.bus import Bus
 from hal.clock import ClockEstimate
-from hal.desk import info_from_json
+from hal.desk import info_from_json, reset_time
 from hal.errors import BusError
 from hal.messages import STOP, Command, CourseState, Episode
 from hal.remote import RESET_S, RemoteRobot
@@ -36,7 +36,7 @@ class WiredArena:
         """Start afresh, with wheels that stand. Raises `BusError` if the twin refuses."""
         self._robot.drive(Command(STOP, self._robot.now()))
         answer = self._bus.ask(RESET, msgspec.json.encode(episode), timeout_s=RESET_S)
-        self._not_before_s = msgspec.json.decode(answer, type=float)
+        self._not_before_s = reset_time(answer)
         # The twin answers when its devices show the new episode.
         self._robot.link.refresh(self._robot.now())
 

@@ -1,19 +1,21 @@
-"""The HAL server in real time: three threads, and the one that moves the wheels waits for none of the others.
+"""The HAL server in real time: four threads, and the one that moves the wheels waits for none of the others.
 
 - commands: polls them, lets the governor judge, moves the base, strikes when they stop coming;
+- applied: tells the bus what came of them;
 - sensors: opens and reads the robot, publishes what is new, answers queries;
 - images: compresses and sends them, if anybody listens, and skips what it has no time for.
 """
 
 import threading
 import time
+from collections import deque
 
 from hal.bus import Bus
 from hal.desk import Desk
 from hal.errors import SensorError
 from hal.governed import GovernedRobot
 from hal.inlet import Inlet
-from hal.messages import Applied, Observation
+from hal.messages import Applied, Observation, Reason
 from hal.outlet import Outlet
 from hal.port import Arena
 from hal.topics import APPLIED, SIM_STATE
@@ -22,19 +24,21 @@ POLL_S = 0.002  # how long a command may lie
 WATCHDOG_S = 0.02
 SENSOR_S = 0.005  # how long a new reading may lie
 JOIN_S = 2.0
+UNTOLD = 16  # what was applied and could not be told yet, at most
 
 
 class CommandLoop:
-    """Moves the wheels: law 1 stands on this page."""
+    """Moves the wheels: law 1 stands on this page. Nothing here waits for the bus: `herald` tells what was applied."""
 
-    def __init__(self, robot: GovernedRobot, bus: Bus) -> None:
+    def __init__(self, robot: GovernedRobot, bus: Bus, herald: "AppliedLoop") -> None:
         self._robot = robot
         self.inlet = Inlet(bus)
-        self._applied = bus.publisher(APPLIED)
+        self._herald = herald
 
     def run(self, stop: threading.Event) -> None:
         """Obey and watch until `stop` is set; leaves the wheels at zero, whatever happens."""
         watch_s = publish_s = time.monotonic()
+        told: Reason | None = None
         try:
             while not stop.wait(POLL_S):
                 now_s = time.monotonic()
@@ -43,9 +47,10 @@ class CommandLoop:
                     continue
                 watch_s = now_s + WATCHDOG_S
                 applied = self._robot.tick()
-                if commanded or now_s >= publish_s:
+                if commanded or applied.reason is not told or now_s >= publish_s:
                     publish_s = now_s + 1.0 / APPLIED.rate_hz
-                    self._publish(applied)
+                    told = applied.reason
+                    self._herald.offer(applied)
         finally:
             self._robot.halt()
 
@@ -59,8 +64,29 @@ class CommandLoop:
             self._robot.submit(command)
         return bool(commands)
 
-    def _publish(self, applied: Applied) -> None:
-        self._applied.put(applied, self._robot.now(), answers=applied.answers)
+
+class AppliedLoop:
+    """Tells what was applied, in order; a bus that takes nothing loses the oldest of it and holds nobody up."""
+
+    def __init__(self, robot: GovernedRobot, bus: Bus) -> None:
+        self._robot = robot
+        self._publisher = bus.publisher(APPLIED)
+        self._untold: deque[Applied] = deque(maxlen=UNTOLD)
+        self._offered = threading.Event()
+
+    def offer(self, applied: Applied) -> None:
+        """Leave one to be told."""
+        self._untold.append(applied)
+        self._offered.set()
+
+    def run(self, stop: threading.Event) -> None:
+        """Tell until `stop` is set."""
+        while not stop.is_set():
+            self._offered.wait(JOIN_S / 4)
+            self._offered.clear()
+            while self._untold:
+                applied = self._untold.popleft()
+                self._publisher.put(applied, self._robot.now(), answers=applied.answers)
 
 
 class SensorLoop:

@@ -18,7 +18,7 @@ from hal.instance import only_instance
 from hal.outlet import Outlet
 from hal.port import Arena
 from hal.serve_lockstep import LockstepLoop
-from hal.serve_realtime import JOIN_S, CommandLoop, ImageLoop, SensorLoop
+from hal.serve_realtime import JOIN_S, AppliedLoop, CommandLoop, ImageLoop, SensorLoop
 from hal.topics import INFO
 
 LOOK_S = 0.05
@@ -98,8 +98,10 @@ class HalServer:
         sensors = crew.start("sensors", sense)
         while not opened.wait(LOOK_S) and not stop.is_set():
             pass
-        commands = CommandLoop(self._robot, self._bus)
+        applied = AppliedLoop(self._robot, self._bus)
+        commands = CommandLoop(self._robot, self._bus, applied)
         wheels = crew.start("commands", lambda: commands.run(stop))
+        crew.start("applied", lambda: applied.run(stop))
         crew.start("images", lambda: images.run(stop))
         estop = EstopDesk(self._robot, self._bus)
         crew.start("estop", lambda: estop.run(stop))

@@ -107,7 +107,7 @@ class Rosbot:
         """Send a velocity to the base, or zero if the robot may not move."""
         twist, reason, clamps = self._interlock.judge(command.twist, self._lost())
         try:
-            self.base.drive(twist)
+            self.base.drive(twist, command.stamp_s)
         except ValueError:  # not finite
             twist, reason = STOP, Reason.REFUSED
             self.base.drive(STOP)

@@ -2,13 +2,16 @@
 
 Change `faults` at any time, from any thread. While `dark`, datagrams are lost, and streams held and delivered late, as
 TCP does; `delay_s` holds everything back, `copies` sends every datagram more than once, `swap` exchanges neighbours;
-`no_datagrams` loses all of them and no stream.
+`lost` is the share of datagrams that do not arrive, `narrow_byte_s` all that fits through in a second either way: what
+does not is lost if it is a datagram, and waits if it is of a stream.
 
 python -m tools.relay PORT TARGET_PORT     the same as a process of its own, which can be killed
 """
 
 import asyncio
 import contextlib
+import math
+import random
 import sys
 import threading
 from collections.abc import Callable, Coroutine
@@ -16,6 +19,8 @@ from dataclasses import dataclass
 from typing import Any, cast
 
 CHUNK = 65536
+PACKET = 500  # of a stream, where it is narrow
+QUEUE_S = 0.1  # datagrams that would wait longer are lost
 LOOK_S = 0.01
 READY_S = 5.0
 READY = "passes on"
@@ -26,10 +31,27 @@ class LinkFaults:
     """What is wrong with the link now."""
 
     dark: bool = False
-    no_datagrams: bool = False
     delay_s: float = 0.0
     copies: int = 1
     swap: bool = False
+    lost: float = 0.0
+    narrow_byte_s: float = math.inf
+
+
+class Narrows:
+    """How long what goes through has to wait, where only so much fits. Pure; the time comes in."""
+
+    def __init__(self) -> None:
+        self._free_s = -math.inf
+
+    def pass_s(self, size: int, byte_s: float, now_s: float) -> float:
+        """Take this much, and return how long it is until all of it is through."""
+        self._free_s = now_s + self.queue_s(now_s) + size / byte_s
+        return self._free_s - now_s
+
+    def queue_s(self, now_s: float) -> float:
+        """How long what comes now would wait for what is before it."""
+        return max(self._free_s - now_s, 0.0)
 
 
 class Relay:
@@ -38,6 +60,8 @@ class Relay:
     def __init__(self, port: int, target_port: int) -> None:
         self.faults = LinkFaults()
         self._ports = port, target_port
+        self.to_robot, self.from_robot = Narrows(), Narrows()
+        self.chance = random.Random(0)
         self._loop = asyncio.new_event_loop()
         self._ready = threading.Event()
         self._streams: set[asyncio.StreamWriter] = set()
@@ -90,8 +114,8 @@ class Relay:
         except OSError:
             writer.close()
             return
-        self.start(self._pump(reader, far_writer))
-        self.start(self._pump(far_reader, writer))
+        self.start(self._pump(reader, far_writer, self.to_robot))
+        self.start(self._pump(far_reader, writer, self.from_robot))
 
     def keep(self, transport: asyncio.BaseTransport) -> None:
         """Close a transport with the relay."""
@@ -103,13 +127,15 @@ class Relay:
         self._tasks.add(task)
         task.add_done_callback(self._tasks.discard)
 
-    async def _pump(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+    async def _pump(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter, narrows: Narrows) -> None:
         self._streams.add(writer)
+        faults = self.faults
         try:
-            while data := await reader.read(CHUNK):
-                await asyncio.sleep(self.faults.delay_s)
-                while self.faults.dark:
+            while data := await reader.read(CHUNK if faults.narrow_byte_s == math.inf else PACKET):
+                await asyncio.sleep(faults.delay_s)
+                while faults.dark:
                     await asyncio.sleep(LOOK_S)
+                await asyncio.sleep(narrows.pass_s(len(data), faults.narrow_byte_s, self._loop.time()))
                 writer.write(data)
                 await writer.drain()
         except OSError:
@@ -134,14 +160,14 @@ class _Front(asyncio.DatagramProtocol):
 
     def datagram_received(self, data: bytes, addr: tuple[str, int]) -> None:
         if addr not in self._far:
-            self._far[addr] = _Sender(self._relay.faults)
+            self._far[addr] = _Sender(self._relay, self._relay.to_robot)
             self._relay.start(self._connect(addr, data))
         else:
             self._far[addr].send(data)
 
     async def _connect(self, addr: tuple[str, int], first: bytes) -> None:
         loop = asyncio.get_running_loop()
-        back = _Sender(self._relay.faults)
+        back = _Sender(self._relay, self._relay.from_robot)
         back.open(lambda data: self._near.sendto(data, addr))
         there, _ = await loop.create_datagram_endpoint(
             lambda: _Back(back), remote_addr=("127.0.0.1", self._target_port)
@@ -164,8 +190,9 @@ class _Back(asyncio.DatagramProtocol):
 class _Sender:
     """Sends datagrams one way, as badly as asked."""
 
-    def __init__(self, faults: LinkFaults) -> None:
-        self._faults = faults
+    def __init__(self, relay: Relay, narrows: Narrows) -> None:
+        self._faults, self._chance = relay.faults, relay.chance
+        self._narrows = narrows
         self._put: Callable[[bytes], None] | None = None
         self._held: bytes | None = None
 
@@ -174,7 +201,7 @@ class _Sender:
 
     def send(self, data: bytes) -> None:
         faults = self._faults
-        if faults.dark or faults.no_datagrams or self._put is None:
+        if faults.dark or self._put is None or self._chance.random() < faults.lost:
             return
         if faults.swap and self._held is None:
             self._held = data
@@ -182,8 +209,14 @@ class _Sender:
         for one in (data, self._held):
             if one is not None:
                 for _ in range(faults.copies):
-                    asyncio.get_running_loop().call_later(faults.delay_s, self._put, one)
+                    self._send(one, self._put)
         self._held = None
+
+    def _send(self, data: bytes, put: Callable[[bytes], None]) -> None:
+        loop, faults = asyncio.get_running_loop(), self._faults
+        if self._narrows.queue_s(loop.time()) <= QUEUE_S:
+            passed_s = self._narrows.pass_s(len(data), faults.narrow_byte_s, loop.time())
+            loop.call_later(faults.delay_s + passed_s, put, data)
 
 
 def main(port: int, target_port: int) -> None:

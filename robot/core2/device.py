@@ -44,7 +44,7 @@ class Counts:
 class Core2:
     """Drives the base at `url` and reads it. `session` is for a `Keeper`; the rest may be called from any thread.
 
-    A command is repeated at 20 Hz until there is another, and for `timeout_s` at most: then it sends zero.
+    A command is repeated at 20 Hz until there is another, and until it is `timeout_s` old at most: then it sends zero.
     """
 
     def __init__(self, url: str, settings: BaseSettings, timeout_s: float) -> None:
@@ -75,13 +75,16 @@ class Core2:
         """Whether the board is heard and can be driven now; false while it restarts, or just after its guard struck."""
         return self._answers and time.monotonic() >= self._held_until_s
 
-    def drive(self, twist: Twist) -> None:
-        """Set the velocity from now on. Raises `ValueError` for what is not finite: the board would obey it."""
+    def drive(self, twist: Twist, decided_s: float = math.inf) -> None:
+        """Set the velocity from now on; `decided_s` on the monotonic clock, or now, is what its age counts from.
+
+        Raises `ValueError` for what is not finite: the board would obey it.
+        """
         if not (math.isfinite(twist.linear_m_s) and math.isfinite(twist.angular_rad_s)):
             raise ValueError(f"{twist} is no velocity")
         with self._lock:
             changed = twist != self._twist
-            self._twist, self._until_s = twist, time.monotonic() + self._timeout_s
+            self._twist, self._until_s = twist, min(decided_s, time.monotonic()) + self._timeout_s
         if changed:
             self._news.set()
 
@@ -156,8 +159,10 @@ class Core2:
                     begin()
                 begun = True
             elif now_s >= due_s or self._news.is_set():
-                due_s = now_s + SEND_S
                 self._tell(line, now_s)
+                due_s = now_s + SEND_S
+                if now_s < self._until_s:  # zero is sent when it is due, not with the next repetition
+                    due_s = min(due_s, self._until_s)
             buffer += line.read(READ_S)
 
     def _listen(self, line: Line, buffer: bytes, now_s: float) -> tuple[bytes, bool]:
@@ -193,7 +198,7 @@ class Core2:
         with self._lock:
             off, braked = self._motors_off, now_s >= self._power_until_s
             held = off or now_s < self._held_until_s
-            twist = self._twist if now_s <= self._until_s and not held else STOP
+            twist = self._twist if now_s < self._until_s and not held else STOP
         line.write(self._frame_of(twist))
         self.counts.commands += 1
         if self._motors_told is not off and (braked or not off):

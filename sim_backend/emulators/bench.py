@@ -25,6 +25,7 @@ RESET_S = 0.25  # two turns of the lidar and a bit
 JOIN_S = 5.0
 REACH_M = 12.0  # of an A2M8; a profile that sees less far is served as in a hall with walls at this distance
 QUALITY = 95
+DIRECTIONS = 181
 
 
 class WiredTwin:
@@ -68,6 +69,11 @@ class WiredTwin:
     def state(self) -> CourseState:
         """Ground truth now."""
         return self.twin.state()
+
+    def echo_share(self) -> float:
+        """Share of the directions ahead, in the networks' field of view, from which the lidar gets an echo now."""
+        half_rad = self.twin.profile.features.fov_rad / 2
+        return float(np.count_nonzero(self._distances(np.linspace(-half_rad, half_rad, DIRECTIONS))) / DIRECTIONS)
 
     def close(self) -> None:
         """Unplug everything and close the twin. May be called twice."""

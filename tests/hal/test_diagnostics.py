@@ -58,7 +58,7 @@ def test_it_says_that_datagrams_do_not_get_through_and_still_drives(capfd):
     with served(real_time_null()) as robot:
         front = new_endpoint()
         with Relay(int(front.split(":")[1]), int(robot.endpoint.split(":")[1])) as relay:
-            relay.faults.no_datagrams = True
+            relay.faults.lost = 1.0
             bus = Bus(robot.name, connect=front)
             client = RemoteRobot(bus)
             client.open()

@@ -10,11 +10,11 @@ import pytest
 import zenoh
 from wiring import PROFILE, joined, new_endpoint, new_name, real_time_null, remote, served, wait_for
 
-from hal.bus import Bus
+from hal.bus import Bus, Publisher
 from hal.codec import encode
 from hal.errors import BusError, DeviceError
 from hal.governed import GovernedRobot
-from hal.messages import STOP, Command, DepthImage, Episode, Reason, Source, Twist
+from hal.messages import STOP, Applied, Command, DepthImage, Episode, Reason, Source, Twist
 from hal.null import NullRobot
 from hal.profile import STOP_BUDGET_S
 from hal.remote import RemoteArena, RemoteRobot
@@ -113,6 +113,26 @@ def test_a_sensor_that_never_answers_leaves_the_wheels_in_control():
         robot.join()
         assert time.monotonic() - began_s < 6.0
         leave.set()
+
+
+def test_a_bus_that_takes_nothing_leaves_the_wheels_in_control(monkeypatch):
+    leave, stuck, put = threading.Event(), threading.Event(), Publisher.put
+
+    def put_or_hang(self, message, *words, **more):
+        if stuck.is_set() and isinstance(message, Applied):
+            leave.wait(20.0)
+        put(self, message, *words, **more)
+
+    monkeypatch.setattr(Publisher, "put", put_or_hang)
+    with served(real_time_null()) as robot, remote(robot) as client:
+        get_going(client)
+        stuck.set()
+        client.drive(Command(GO, client.now()))
+        assert not is_still(robot)
+        wait_for(lambda: is_still(robot), DECISION_S + STOP_BUDGET_S + 0.5)
+        assert robot.governed.state == "stopped"
+        leave.set()
+        get_going(client)
 
 
 @pytest.mark.parametrize("method", ["read", "drive"])

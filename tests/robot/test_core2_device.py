@@ -58,6 +58,18 @@ def wait_for(condition, timeout_s=3.0):
         time.sleep(0.01)
 
 
+def test_the_age_of_a_command_counts_from_when_it_was_decided(tmp_path):
+    with Bench(tmp_path / "base", timeout_s=2.0) as bench:
+        began_s = time.monotonic()
+        bench.base.drive(Twist(0.1, 0.0), began_s - 1.5)
+        wait_for(lambda: bench.twists[-2:] == [Twist(0.1, 0.0), STOP])
+        assert time.monotonic() - began_s < 1.9
+        bench.base.drive(Twist(0.1, 0.0), time.monotonic() - 2.5)
+        time.sleep(0.2)
+        assert bench.twists[-1] == STOP
+        assert len(bench.twists) == 3
+
+
 @pytest.mark.parametrize("baud", [525000, 500000, 460800])
 def test_it_finds_the_speed_and_learns_the_topics(tmp_path, baud):
     with Bench(tmp_path / "base", Firmware(baud=baud, boot_s=0.1)) as bench:

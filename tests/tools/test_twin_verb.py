@@ -103,3 +103,13 @@ def test_whoever_connects_learns_the_world_and_can_drive(tmp_path):
         assert arena.state().x_m - before.x_m == pytest.approx(0.5, abs=0.15)
         robot.close()
         bus.close()
+
+
+def test_a_world_in_which_the_real_lidar_would_be_blind_is_refused(tmp_path):
+    words = ["--wire", str(tmp_path), "--profile", "rosbot2", "--renderer", "tiny"]
+    done = lira("twin", "--world", "garden", *words)
+    assert done.returncode == 2
+    what, remedy = done.stderr.splitlines()[-2:]
+    assert "in world 'garden' the lidar of 'rosbot2' gets an echo from" in what
+    assert "--wire" in remedy
+    assert not list(tmp_path.iterdir())

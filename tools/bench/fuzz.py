@@ -16,12 +16,15 @@ import numpy as np
 from fusion.preprocess import gray_image
 from hal.attachment import Attachment, parse_attachment
 from hal.codec import decode, encode
-from hal.desk import REALTIME, Info, info_from_json
+from hal.desk import REALTIME, Info, info_from_json, reset_time
 from hal.errors import LiraError
+from hal.estop import EstopState
 from hal.messages import CompressedImage, Episode, Image
 from hal.outlet import compress
 from hal.profile import load_profile, profile_from_json
 from hal.ros import CODECS
+from sim_backend.catalogue import load_world
+from sim_backend.world import World
 from tools.bench import Row
 from tools.bench.samples import of_kind
 
@@ -45,6 +48,8 @@ def targets() -> list[Target]:
     """Everything that takes bytes off the bus."""
     profile = load_profile("rosbot2")
     json_errors = (msgspec.MsgspecError, ValueError)
+    estop = msgspec.json.encode(EstopState("armed", {"late": 3}))
+    world = msgspec.json.encode(load_world("corridor"))
     found = [
         Target(kind.__name__, partial(decode, kind), (LiraError,), tuple(map(encode, of_kind(kind)))) for kind in CODECS
     ]
@@ -56,6 +61,9 @@ def targets() -> list[Target]:
         Target("profile", profile_from_json, (LiraError,), (profile.to_json(),)),
         Target("info", info_from_json, (LiraError,), (Info(profile, REALTIME, 1).to_json(),)),
         Target("episode", partial(msgspec.json.decode, type=Episode), json_errors, (msgspec.json.encode(Episode()),)),
+        Target("estop", partial(msgspec.json.decode, type=EstopState), json_errors, (estop,)),
+        Target("reset", reset_time, (LiraError,), (msgspec.json.encode(12.5),)),
+        Target("world", partial(msgspec.json.decode, type=World), json_errors, (world,)),
         Target("picture", decode_picture, (LiraError,), pictures),
     ]
 

@@ -117,9 +117,9 @@ def cut_link(bench: Bench) -> None:
     bench.relay.cut()
 
 
-def kill_link(bench: Bench) -> None:
-    """Kill -9 the process in the link."""
-    bench.link.signal(signal.SIGKILL)
+def link_signal(number: signal.Signals) -> Act:
+    """Send the process in the link a signal."""
+    return lambda bench: bench.link.signal(number)
 
 
 def restart_link(bench: Bench) -> None:

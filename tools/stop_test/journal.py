@@ -10,17 +10,24 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
+from hal.messages import Reason
+
 _LAYOUT = struct.Struct("<Bddddd")
+REASONS: tuple[Reason | None, ...] = (None, *Reason)
 
 
 @dataclass(frozen=True, slots=True)
 class Given:
-    """The wheels were given a velocity; `age_s` is that of the command behind it, nan without one."""
+    """The wheels were given a velocity; `age_s` is that of the command behind it, nan without one.
+
+    `reason` is the governor's, None if it was not the governor that gave it.
+    """
 
     time_s: float
     linear_m_s: float
     angular_rad_s: float
     age_s: float
+    reason: Reason | None = None
 
     @property
     def moving(self) -> bool:
@@ -47,7 +54,8 @@ class JournalWriter:
 
     def given(self, record: Given) -> None:
         """Note what the wheels got."""
-        self._write(0, record.time_s, record.linear_m_s, record.angular_rad_s, record.age_s, 0.0)
+        code = float(REASONS.index(record.reason))
+        self._write(0, record.time_s, record.linear_m_s, record.angular_rad_s, record.age_s, code)
 
     def truth(self, record: Truth) -> None:
         """Note where it is."""
@@ -65,10 +73,10 @@ class JournalWriter:
 def read_journal(path: Path, since_s: float) -> tuple[list[Given], list[Truth]]:
     """Return what was noted since a time."""
     given, truth = [], []
-    for kind, time_s, a, b, c, _ in _records(path):
+    for kind, time_s, a, b, c, code in _records(path):
         if time_s >= since_s:
             if kind == 0:
-                given.append(Given(time_s, a, b, c))
+                given.append(Given(time_s, a, b, c, REASONS[int(code)]))
             else:
                 truth.append(Truth(time_s, a, b, c))
     return given, truth

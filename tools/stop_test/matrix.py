@@ -60,7 +60,7 @@ def try_fault(bench: Rig, fault: Fault, phase_s: float) -> Verdict:
     fault.mend(bench)
     time.sleep(WATCH_S)
     given, truth = read_journal(bench.journal, began_s)
-    verdict = judge(given, truth, broken_s, healed_s + WATCH_S, bench.profile)
+    verdict = judge(given, truth, broken_s, healed_s + WATCH_S, bench.profile, fault.below)
     if fault.counted:
         verdict = replace(verdict, refused=bench.refused() - refused_before)
     bench.renew(fatal=fault.fatal)

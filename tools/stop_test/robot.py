@@ -18,6 +18,7 @@ import numpy as np
 from hal.bus import Bus
 from hal.governed import GovernedRobot
 from hal.messages import Applied, Image, LaserScan, Observation
+from hal.outlet import compress
 from hal.port import Robot
 from hal.profile import RobotProfile, load_profile
 from hal.refusals import count_refusals
@@ -58,8 +59,9 @@ class BreakableTwin(Twin):
             return replace(seen, scan=held.scan)
         if self.fault == "half a scan" and isinstance(seen.scan, LaserScan):
             return replace(seen, scan=replace(seen.scan, ranges=seen.scan.ranges[: len(seen.scan.ranges) // 2]))
-        if self.fault == "black image" and isinstance(seen.image, Image):
-            return replace(seen, image=replace(seen.image, data=np.zeros_like(seen.image.data)))
+        if self.fault == "black image" and seen.image is not None:
+            black = Image(seen.image.stamp_s, np.zeros((HEIGHT_PX, WIDTH_PX, 3), np.uint8))
+            return replace(seen, image=compress(black, self.profile.camera.encoding))
         return seen
 
 
@@ -80,16 +82,20 @@ class BreakableDrivers(Rosbot):
 
 
 class WatchedRobot(GovernedRobot):
-    """Notes down what the wheels are given."""
+    """Notes down what the wheels are given. While it `hangs`, so does every thread that needs the governor."""
+
+    hangs = False
 
     def __init__(self, robot: Robot, journal: JournalWriter) -> None:
         super().__init__(robot)
         self._journal = journal
 
     def _actuate(self) -> Applied:
+        while self.hangs:
+            time.sleep(NAP_S)
         applied = super()._actuate()
-        twist = applied.twist
-        self._journal.given(Given(time.monotonic(), twist.linear_m_s, twist.angular_rad_s, applied.command_age_s))
+        pair = (applied.twist.linear_m_s, applied.twist.angular_rad_s)
+        self._journal.given(Given(time.monotonic(), *pair, applied.command_age_s, applied.reason))
         return applied
 
 
@@ -104,7 +110,10 @@ def main(name: str, endpoint: str, profile_name: str, journal_path: str, ear_por
     profile, journal = small_pictures(load_profile(profile_name)), JournalWriter(Path(journal_path))
     robot = open_drivers(profile, *devices) if devices else BreakableTwin(profile)
 
+    watched = WatchedRobot(robot, journal)
+
     def hear(word: str) -> None:
+        watched.hangs = word == "governor hangs"
         if word == "main hangs":
             signal.pthread_kill(threading.main_thread().ident or 0, signal.SIGUSR1)
         elif word == "what time":
@@ -127,7 +136,7 @@ def main(name: str, endpoint: str, profile_name: str, journal_path: str, ear_por
                     threading.Thread(target=keep_truth, args=(twin, journal), daemon=True).start()
                 print(READY, flush=True)
 
-            HalServer(WatchedRobot(robot, journal), bus, twin, ready=ready).run(stop)
+            HalServer(watched, bus, twin, ready=ready).run(stop)
     finally:
         bus.close()
 

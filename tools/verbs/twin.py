@@ -32,6 +32,7 @@ if TYPE_CHECKING:
 
 LOOK_S = 0.2
 STATUS_S = 10.0
+ECHOES = 0.5  # of the directions ahead: with less the learner refuses the scan
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -135,6 +136,7 @@ def run_wire(args: argparse.Namespace, profile: "RobotProfile", world: "World") 
             held.callback(bus.close)
         wired = WiredTwin(twin, args.wire)
         try:
+            _check_echoes(wired.echo_share(), profile, world)
             urls = ["--lidar", f"{args.wire}/rplidar", "--base", f"{args.wire}/core2", "--camera", wired.url]
             urls += ["--profile", args.profile]
             print(f"world '{world.name}' behind its devices; open them with: lira robot {shlex.join(urls)}", flush=True)
@@ -145,6 +147,17 @@ def run_wire(args: argparse.Namespace, profile: "RobotProfile", world: "World") 
         finally:
             wired.close()
     return 0
+
+
+def _check_echoes(share: float, profile: "RobotProfile", world: "World") -> None:
+    """Refuse a world in which the real robot's lidar would be as good as blind, so that nothing drives it."""
+    if share < ECHOES:
+        raise ConfigError(
+            f"in world '{world.name}' the lidar of '{profile.name}' gets an echo from {share:.0%} of the way ahead, "
+            "and its real driver cannot tell open ground from a blind lidar",
+            f"Choose a world with walls within {profile.lidar.range_max_m:g} m, such as room or corridor, or leave out "
+            "--wire.",
+        )
 
 
 def serve_arena(wired: "WiredTwin", bus: "Bus", profile: "RobotProfile", world: "World", stop: threading.Event) -> None:

@@ -1,0 +1,77 @@
+"""Opens a zenoh session as a robot or its peer needs it.
+
+zenoh sends what must arrive over the datagram link, too, while that is the only one: what two ends declare to each
+other when they meet would be lost with a datagram, for good. So the stream comes first. A session that connects opens
+when its stream is up, or not at all; the datagrams follow in the background, as soon as they get through.
+"""
+
+import json
+
+import zenoh
+
+from hal.errors import BusError
+from hal.keys import Keys
+
+LEASE_MS = 2000
+OPEN_MS = 2000
+CONNECT_MS = 3000
+
+
+def open_session(
+    robot: str, listen: str | None, connect: str | None, keys: Keys | None, *, watch: bool = False
+) -> zenoh.Session:
+    """Open one; the arguments are those of `hal.bus.Bus`. With neither address it is connected to nobody.
+
+    Raises `BusError`: if it does not connect, after `CONNECT_MS` at the latest.
+    """
+    config = zenoh.Config()
+    for key, value in {
+        # Both ends are peers: a client would use one link only. What peers say is passed on to clients alone.
+        "mode": "client" if watch else "peer",
+        "listen/endpoints": [] if listen is None else _links(listen, keys),
+        "connect/endpoints": [] if connect is None else _connecting(_links(connect, keys), watch=watch),
+        "connect/timeout_ms": CONNECT_MS,
+        "connect/exit_on_failure": False,
+        "connect/retry": {"period_init_ms": 200, "period_max_ms": 1000, "period_increase_factor": 2},
+        # Do not wait for the datagrams: whoever opens watches links from the first on.
+        "scouting/delay": 0,
+        "scouting/multicast/enabled": False,
+        "scouting/gossip/enabled": False,
+        "transport/unicast/max_links": 2,
+        # Whoever has no keys for a robot that wants some hears it after this long.
+        "transport/unicast/open_timeout": OPEN_MS,
+        "transport/link/tx/lease": LEASE_MS,
+        # It can lose a message when a receiver stalls.
+        "transport/shared_memory/enabled": False,
+        # Late readers of a latched topic are served by its time stamp.
+        "timestamping/enabled": True,
+        **({} if keys is None else keys.zenoh_config(robot)),
+    }.items():
+        config.insert_json5(key, json.dumps(value))
+    try:
+        return zenoh.open(config)
+    except zenoh.ZError as error:
+        # zenoh nests its reasons in brackets, each with the place in its sources.
+        reason = str(error).split(" at /")[0].split(": [")[-1]
+        if "in use" in reason:
+            raise BusError(
+                f"{listen} is already in use",
+                "Stop the other program (another robot?), or choose another port with --listen HOST:PORT.",
+            ) from error
+        raise BusError(
+            f"cannot open the bus at {listen or connect}: {reason}", "Check the address, and that the robot runs."
+        ) from error
+
+
+def _links(endpoint: str, keys: Keys | None) -> tuple[str, str]:
+    """One TCP link for what must arrive and one UDP link for what must be new (zenoh picks by reliability).
+
+    With keys these are TLS, and the datagrams of QUIC.
+    """
+    stream, datagram = ("tcp", "udp") if keys is None else ("tls", "quic")
+    return f"{stream}/{endpoint}?rel=1", f"{datagram}/{endpoint}?rel=0"
+
+
+def _connecting(links: tuple[str, str], *, watch: bool) -> list[str]:
+    stream, datagram = links
+    return [stream] if watch else [f"{stream}#exit_on_failure=true", datagram]
