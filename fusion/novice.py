@@ -64,7 +64,7 @@ class Novice:
         self.training_steps = 0  # finished ones
         self._trainer = trainer
         self._fresh = 0  # stored since the last training step that m labels brought began
-        self._hurries = False
+        self._hurried = 0  # training steps asked for beside those
 
     @property
     def trained(self) -> bool:
@@ -109,13 +109,13 @@ class Novice:
         if self._fresh >= self.settings.labels_per_step:
             self._fresh -= self.settings.labels_per_step
             self._trainer.start(now_s)
-        elif self._hurries:
-            self._hurries = False
+        elif self._hurried:
+            self._hurried -= 1
             self._trainer.start(now_s)
 
-    def hurry(self) -> None:
-        """Ask for a training step beside those that m labels bring, as soon as the trainer is free."""
-        self._hurries = self.stored > 0
+    def hurry(self, steps: int) -> None:
+        """Ask for training steps beside those that m labels bring, as soon as the trainer is free."""
+        self._hurried = steps if self.stored else 0
 
     def catch_up(self) -> None:
         """Run the training steps that are due, one after the other, and wait for them. The remainder is carried."""

@@ -27,13 +27,13 @@ from hal.messages import Action, ExpertView
 
 
 class PlusSettings(Table, frozen=True, tag="plus"):
-    """What `plus` adds to `lira`. 0 switches a part off, for `recall` and `sure` None, for `at_once` False."""
+    """What `plus` adds to `lira`. 0 switches a part off, for `recall` and `sure` None."""
 
     lira: LiraSettings = LiraSettings()
     prefill: int = 60  # labels the experts give before the human is asked
     reserve_s: float = 1.0  # an expert's label waits so long for the human's objection
     wheel_s: float = 1.0  # an expert that was given the wheel keeps it so long
-    at_once: bool = True  # a training step whenever the human lets go
+    at_once: int = 3  # training steps whenever the human lets go
     recall: float | None = 0.9  # share of resolved ambiguities that the memory knows again (conformal)
     sure: float | None = 0.25  # in doubt less than in this share of the moments of take-over, the novice is sure
     ensemble: int = 5
@@ -100,8 +100,8 @@ class LiraPlus(LiraSpf):
         dropped = self._drop() if objection else ()
         if objection and not self._human_drove and self._log is not None and self.novice.trained:
             self._log.take_over(proposal.features)
-        if self._human_drove and human is None and self._plus.at_once:
-            self.novice.hurry()
+        if self._human_drove and human is None:
+            self.novice.hurry(self._plus.at_once)
         self._human_drove = human is not None
         self._remember(proposal, human)
         if human is not None:

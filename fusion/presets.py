@@ -68,7 +68,7 @@ METHODS = {
         Method("plus-no-wheel", PlusSettings(wheel_s=0.0), _HEAVY, mirrored=True),
         Method("plus-no-memory", PlusSettings(recall=None), _HEAVY, mirrored=True),
         Method("plus-no-confidence", PlusSettings(sure=None), _HEAVY, mirrored=True),
-        Method("plus-no-at-once", PlusSettings(at_once=False), _HEAVY, mirrored=True),
+        Method("plus-no-at-once", PlusSettings(at_once=0), _HEAVY, mirrored=True),
         Method("plus-m30", PlusSettings(), LearningSettings(human_weight=3.0), mirrored=True),
         Method("hg-dagger", _HG, trunks="scratch"),
         Method("hg-dagger-m10", _HG, _M10, trunks="scratch"),
