@@ -242,8 +242,8 @@ class Session:
 
 
 def _after_crash(episode: Episode, state: CourseState, phase: str) -> Episode:
-    """Where the robot is put down after a crash: before it to try again, or behind it to go on."""
+    """Where the robot is put down after a crash to go on with the lap: before it to try again, or behind it."""
     if not np.isfinite(state.progress_m):
         return episode
     shift = -PUT_BACK_M if phase == "train" else PUT_ON_M
-    return Episode(episode.layout, start_m=max(0.0, state.progress_m + shift))
+    return Episode(episode.layout, start_m=max(0.0, state.progress_m + shift), began_m=episode.start_m)

@@ -309,13 +309,15 @@ class Episode:
     """A fresh start in a twin's world.
 
     `layout` seeds everything random in the world; `start_m` is where on the course the robot is put down
-    (0: the world's own start), `lateral_m` and `yaw_rad` how far off it, relative to the course.
+    (0: the world's own start), `lateral_m` and `yaw_rad` how far off it, relative to the course. `began_m` is where the
+    lap began that this goes on with, after a crash; None if it begins here.
     """
 
     layout: int = 0
     start_m: float = 0.0
     lateral_m: float = 0.0
     yaw_rad: float = 0.0
+    began_m: float | None = None
 
 
 Action = tuple[float, float]

@@ -19,9 +19,9 @@ ROUNDING_S = 1e-9
 
 @dataclass(frozen=True, slots=True)
 class Verdict:
-    """What the referee knows of the present episode."""
+    """What the referee knows of the present episode, which is of a lap that began at `began_m`."""
 
-    start_m: float
+    began_m: float
     progress_m: float
     lateral_m: float
     clearance_m: float
@@ -39,12 +39,12 @@ class Body:
         self.time_s = 0.0
         self.put_down(0.0, 0.0, 0.0)
 
-    def put_down(self, start_m: float, lateral_m: float, yaw_rad: float) -> None:
-        """Start an episode at rest, at a place relative to the course."""
+    def put_down(self, start_m: float, lateral_m: float, yaw_rad: float, began_m: float | None = None) -> None:
+        """Start an episode at rest, at a place relative to the course, in a lap that begins there or at `began_m`."""
         self.motion = drive.motion(*self.course.start_pose(start_m, lateral_m, yaw_rad))
         self.odometry = drive.motion(0.0, 0.0, 0.0)
         self.command(STOP)
-        self.verdict = Verdict(start_m, start_m, lateral_m, math.inf)
+        self.verdict = Verdict(start_m if began_m is None else began_m, start_m, lateral_m, math.inf)
         self._look()
 
     def place(self, state: CourseState) -> None:
@@ -144,11 +144,11 @@ class Body:
         place = course.place(self.motion.xy, self.motion.yaw_rad, was.progress_m)
         progress_m, lateral_m = float(place.progress_m), float(place.lateral_m)
         self.verdict = Verdict(
-            start_m=was.start_m,
+            began_m=was.began_m,
             progress_m=progress_m,
             lateral_m=lateral_m,
             clearance_m=clearance_m,
             collided=was.collided or touched,
             lost=was.lost or course.lost(lateral_m, clearance_m),
-            finished=was.finished or course.finished(progress_m, was.start_m),
+            finished=was.finished or course.finished(progress_m, was.began_m),
         )

@@ -87,11 +87,11 @@ class Course:
         strayed = limits.stray_m is not None and off_m > limits.stray_m and clearance_m > limits.free_m
         return off_m > limits.lost_m or strayed
 
-    def finished(self, progress_m: float, start_m: float) -> bool:
-        """Tell whether a drive that began at `start_m` is over."""
+    def finished(self, progress_m: float, began_m: float) -> bool:
+        """Tell whether a drive that began at `began_m` is over."""
         if self.limits.finish_m is not None:
             return progress_m >= self.limits.finish_m
-        return progress_m - start_m >= self.limits.laps * self.layout.curve.length_m
+        return progress_m - began_m >= self.limits.laps * self.layout.curve.length_m
 
     def start_pose(self, start_m: float, lateral_m: float, yaw_rad: float) -> tuple[float, float, float]:
         """Pose of a start relative to the course."""

@@ -133,7 +133,7 @@ class Twin:
         with self._sensor_lock, self._lock:
             self._body.advance(self.now())
             self._arrange(episode.layout)
-            self._body.put_down(episode.start_m, episode.lateral_m, episode.yaw_rad)
+            self._body.put_down(episode.start_m, episode.lateral_m, episode.yaw_rad, episode.began_m)
             self._forget()
 
     def place(self, layout: int, state: CourseState) -> None:

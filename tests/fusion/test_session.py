@@ -142,6 +142,7 @@ def test_after_a_crash_in_training_it_starts_again_before_it():
     first, again = track.episodes
     assert first == Episode()
     assert again.start_m == pytest.approx(3.0 - PUT_BACK_M, abs=1.5 * STEP_M)
+    assert again.began_m == 0.0
     assert hand.layouts == [0, 0]
     assert pupil.resets == 3  # before each drive, and when the lap is over
     (lap,) = laps()
@@ -153,7 +154,7 @@ def test_a_crash_near_the_start_starts_at_the_start():
     track = Track(walls=[0.5])
     session, _ = school(track)
     session.teach([Drive(Episode(), NEVER_S)], Hand(), 1)
-    assert track.episodes[1] == Episode(start_m=0.0)
+    assert track.episodes[1] == Episode(start_m=0.0, began_m=0.0)
 
 
 def test_a_world_without_a_line_is_started_all_over():

@@ -169,6 +169,16 @@ def test_leaving_the_line_is_noticed_and_latches():
     assert abs(robot.state().lateral_m) < 0.1
 
 
+@pytest.mark.parametrize(("began_m", "finished"), [(0.0, True), (None, False)])
+def test_who_is_put_down_again_within_a_lap_goes_on_with_it(began_m, finished):
+    robot = body(KINEMATIC, "eight")
+    robot.put_down(robot.course.layout.curve.length_m - 0.5, 0.0, 0.0, began_m)
+    assert not robot.state().finished
+    robot.command(Twist(1.0, 0.0))
+    robot.advance(1.0)
+    assert robot.state().finished == finished
+
+
 def test_without_a_line_there_is_no_progress_but_an_end():
     robot = body(KINEMATIC, "forest")
     robot.put_down(41.0, 0.0, 0.0)
