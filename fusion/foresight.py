@@ -31,6 +31,9 @@ class Foresight(Protocol):
     def set_layout(self, layout: int) -> None:
         """Arrange the boxes as they stand in the episode that begins."""
 
+    def close(self) -> None:
+        """Let go of the second twin."""
+
     def rollout(
         self, state: CourseState, policy: Callable[[Observation], Action], steps: int, period_s: float
     ) -> list[CourseState]:

@@ -78,6 +78,10 @@ class ScriptedTeacher:
         self._foresight.set_layout(layout)
         self._hands_off()
 
+    def close(self) -> None:
+        """Let go of the foresight."""
+        self._foresight.close()
+
     def _hands_off(self) -> None:
         self._driving = False
         self._react_at_s: float | None = None  # when a danger that was seen will be answered

@@ -1,8 +1,8 @@
 """What takes a twin: a scripted teacher who sees everything, and a policy that drives layouts nobody showed it."""
 
 import argparse
-import contextlib
 from collections.abc import Callable, Iterator
+from contextlib import closing, contextmanager
 from functools import partial
 from pathlib import Path
 
@@ -43,27 +43,24 @@ def teach(args: argparse.Namespace, method: Method, robot: RemoteRobot, publish:
         if (folder / RECORD).exists() or (folder / LABELS).exists():
             raise ConfigError(f"{folder} already holds a run", "Choose another folder with --run.")
         with (
+            closing(crew(method, profile, args.seed, in_step, args.experts or task_of(world.name))) as team,
+            closing(teacher(TEACHERS[args.teacher], profile, world, args.layout, args.seed)) as hand,
             DemonstrationLog(folder / LABELS, profile, mirrored=method.mirrored) as log,
             RunWriter(folder / RECORD) as record,
         ):
             record.write(head(args, profile, world.name))
-            team = crew(method, profile, args.seed, in_step, args.experts or task_of(world.name))
-            try:
-                journal = Journal(keep=log.append, write=record.write, publish=publish)
-                loop = ControlLoop(robot, truth=arena.state)
-                session = Session(robot, arena, loop, journal, team.pupil, team.alone)
-                loop.arm()
-                hand = teacher(TEACHERS[args.teacher], profile, world, args.layout, args.seed)
-                course = [lap(profile, world, args.layout)]
-                if team.pupil is None:
-                    converged = session.prove(course)
-                else:
-                    converged = session.teach(course, hand, args.train_laps)
-                    snapshot(folder, team.pupil.novice, profile, args)()
-                session.show(unseen(args, profile, world), hand if team.answered else None)
-                record.write(session.result(converged))
-            finally:
-                team.close()
+            journal = Journal(keep=log.append, write=record.write, publish=publish)
+            loop = ControlLoop(robot, truth=arena.state)
+            session = Session(robot, arena, loop, journal, team.pupil, team.alone)
+            loop.arm()
+            course = [lap(profile, world, args.layout)]
+            if team.pupil is None:
+                converged = session.prove(course)
+            else:
+                converged = session.teach(course, hand, args.train_laps)
+                snapshot(folder, team.pupil.novice, profile, args)()
+            session.show(unseen(args, profile, world), hand if team.answered else None)
+            record.write(session.result(converged))
     return 0 if converged else 1
 
 
@@ -80,7 +77,7 @@ def examine(args: argparse.Namespace, robot: RemoteRobot, publish: Publish, say:
     return 0 if all(each.passed for each in laps) else 1
 
 
-@contextlib.contextmanager
+@contextmanager
 def arena_of(args: argparse.Namespace, robot: RemoteRobot) -> Iterator[tuple[Arena, World]]:
     """Reach into the twin behind a robot, or behind its devices. Raises `ConfigError` for a robot that is none."""
     if args.arena is None:

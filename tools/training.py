@@ -1,5 +1,6 @@
 """Training an expert in process: the same loop, teacher and session as over the bus."""
 
+from contextlib import closing
 from dataclasses import replace
 from pathlib import Path
 
@@ -56,10 +57,10 @@ def train_expert(kind: Sensor, task: str, profile: RobotProfile, seed: int, path
     robot.open()
     try:
         loop = ControlLoop(robot, truth=twin.state)
-        teacher = ScriptedTeacher(Foresight(profile, world), profile, course.teacher, seed)
         session = Session(robot, twin, loop, Journal(write=show), HgDagger(novice))
         loop.arm()
-        passed = session.teach(course.drives, teacher, course.laps)
+        with closing(ScriptedTeacher(Foresight(profile, world), profile, course.teacher, seed)) as teacher:
+            passed = session.teach(course.drives, teacher, course.laps)
     finally:
         robot.close()
     if passed:

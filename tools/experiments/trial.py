@@ -1,6 +1,7 @@
 """One trial: one method taught on one layout by one teacher, from scratch to convergence or its cap."""
 
 import hashlib
+from contextlib import closing
 from pathlib import Path
 
 import msgspec
@@ -94,14 +95,14 @@ def play(trial: Trial) -> Outcome:
         loop = ControlLoop(robot, truth=twin.state)
         session = Session(robot, twin, loop, Journal(keep=notes.label, write=notes.record), team.pupil, team.alone)
         loop.arm()
-        hand = teacher(trial.skill, profile, world, trial.seed, trial.seed)
         course = [lap(profile, world, trial.seed)]
-        if team.pupil is None:
-            converged = session.prove(course)
-        else:
-            converged = session.teach(course, hand, trial.laps, all_laps=trial.all_laps)
         unseen = [lap(profile, world, UNSEEN + trial.seed * trial.unseen + k) for k in range(trial.unseen)]
-        session.show(unseen, hand if team.answered else None)
+        with closing(teacher(trial.skill, profile, world, trial.seed, trial.seed)) as hand:
+            if team.pupil is None:
+                converged = session.prove(course)
+            else:
+                converged = session.teach(course, hand, trial.laps, all_laps=trial.all_laps)
+            session.show(unseen, hand if team.answered else None)
         return Outcome(trial, tuple(notes.laps), session.result(converged), notes.labels, notes.tracks)
     finally:
         team.close()
