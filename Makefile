@@ -40,7 +40,7 @@ bench: setup
 results: setup
 	$(BIN)/lira experiment all --seeds $(SEEDS) --workers $(WORKERS)
 
-# The experts that come with the project, from scratch: the same files again, to the bit, on the same kind of processor.
+# The experts that come with the project, from scratch; each file's header holds the command that made it.
 experts: setup
 	@for expert in $(EXPERTS); do $(BIN)/lira train-expert $$(echo $$expert | tr : ' ') || exit 1; done
 
