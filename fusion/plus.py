@@ -35,7 +35,7 @@ class PlusSettings(Table, frozen=True, tag="plus"):
     wheel_s: float = 1.0  # an expert that was given the wheel keeps it so long
     at_once: int = 3  # training steps whenever the human lets go
     recall: float | None = 0.9  # share of resolved ambiguities that the memory knows again (conformal)
-    sure: float | None = 0.25  # in doubt less than in this share of the moments of take-over, the novice is sure
+    sure: float | None = 0.25  # in doubt less than in the calmest share of the moments of take-over, it is sure
     ensemble: int = 5
 
 

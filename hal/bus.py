@@ -33,7 +33,7 @@ QUERY_PAUSE_S = 0.1
 POLL_S = 0.0005
 FIRST_S = 0.5  # how long to wait for a robot that is not there yet
 WATCH_S = 3.0
-CLOSE_S = 2.5  # longer than a link that is just being opened takes
+CLOSE_S = 3.5  # longer than an attempt to connect takes
 
 
 @dataclass(frozen=True, slots=True)

@@ -12,6 +12,7 @@ one dies with its lease.
 
 import contextlib
 import threading
+import time
 from collections.abc import Callable
 from typing import Any, Generic, TypeVar
 from weakref import WeakSet
@@ -53,8 +54,9 @@ class Connection:
         self._declared: WeakSet[Declared[Any]] = WeakSet()  # what nobody uses any more is not declared again
         self._lock = threading.Lock()  # over the session and what is declared on it
         self._closed, self._up = threading.Event(), threading.Event()
+        self._threads: list[threading.Thread] = []  # that may be inside zenoh
         if connect is not None:
-            threading.Thread(target=self._keep, args=(connect,), name="bus-keeper", daemon=True).start()
+            self._begin(self._keep, connect)
 
     @property
     def closed(self) -> bool:
@@ -73,13 +75,23 @@ class Connection:
         return declared
 
     def close(self, timeout_s: float) -> bool:
-        """Close for good; False if a dead link kept it from closing in time. May be called twice."""
+        """Close for good; False if a dead link kept it from closing in time. May be called twice.
+
+        It waits for its threads: Python aborts the process when one comes out of zenoh while the interpreter ends.
+        """
         with self._lock:
             self._closed.set()
-        closer = threading.Thread(target=_let_go, args=(self.session,), daemon=True, name="bus-close")
-        closer.start()
-        closer.join(timeout_s)
-        return not closer.is_alive()
+            self._begin(_let_go, self.session)
+        until_s = time.monotonic() + timeout_s
+        for thread in list(self._threads):
+            thread.join(max(0.0, until_s - time.monotonic()))
+        return not any(thread.is_alive() for thread in self._threads)
+
+    def _begin(self, work: Callable[..., None], *arguments: Any) -> None:
+        self._threads = [thread for thread in self._threads if thread.is_alive()]
+        thread = threading.Thread(target=work, args=arguments, name=f"bus{work.__name__}", daemon=True)
+        thread.start()
+        self._threads.append(thread)
 
     def _keep(self, connect: Callable[[], zenoh.Session]) -> None:
         while not self._closed.is_set():
@@ -99,13 +111,13 @@ class Connection:
 
     def _replace(self, session: zenoh.Session) -> None:
         with self._lock:
-            before = session if self._closed.is_set() else self.session
-            if before is not session:
-                self.session = session
+            if not self._closed.is_set():
+                before, self.session = self.session, session
                 for declared in self._declared:
                     declared.move(session)
-        # It may take long while links are dead.
-        threading.Thread(target=_let_go, args=(before,), daemon=True, name="bus-let-go").start()
+                self._begin(_let_go, before)  # which may take long while links are dead
+                return
+        _let_go(session)
 
 
 def _lost_a_link(events: Any) -> bool:

@@ -28,8 +28,9 @@ def measure_clearance(profile: RobotProfile, field: Field, scan: LaserScan) -> C
     """
     angles = scan.angle_min + scan.angle_increment * np.arange(len(scan.ranges))
     ranges = np.where(np.isneginf(scan.ranges), scan.range_min, scan.ranges)
-    x_m, y_m = profile.lidar.x_m + ranges * np.cos(angles), ranges * np.sin(angles)
-    in_the_way = np.isfinite(ranges) & (np.abs(y_m) <= profile.base.width_m / 2 + field.margin_m)
+    near_m = np.where(np.isfinite(ranges), ranges, np.nan)  # nothing there is nothing in the way
+    x_m, y_m = profile.lidar.x_m + near_m * np.cos(angles), near_m * np.sin(angles)
+    in_the_way = np.abs(y_m) <= profile.base.width_m / 2 + field.margin_m
 
     def free_m(sign: int) -> float:
         if _is_blind(profile, angles if sign > 0 else angles - math.pi, ranges, sign):

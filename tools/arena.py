@@ -14,7 +14,7 @@ from fusion.experts import load_expert
 from fusion.journal import Journal
 from fusion.method import Alone
 from fusion.presets import Method
-from fusion.record import RunWriter
+from fusion.record import Record, RunWriter
 from fusion.session import Drive, Session
 from fusion.tasks import task_of
 from fusion.teacher import TEACHERS
@@ -32,9 +32,10 @@ from tools.progress import Progress
 from tools.run_folder import LABELS, RECORD, head, snapshot
 
 Publish = Callable[[Decision], None]
+Say = Callable[[str], None]
 
 
-def teach(args: argparse.Namespace, method: Method, robot: RemoteRobot, publish: Publish) -> int:
+def teach(args: argparse.Namespace, method: Method, robot: RemoteRobot, publish: Publish, say: Say) -> int:
     """Teach until the novice passes its proving run, then let it drive unseen layouts. Returns 1 if it did not pass."""
     folder: Path = args.run or Path("runs") / args.method
     profile = robot.profile
@@ -48,8 +49,9 @@ def teach(args: argparse.Namespace, method: Method, robot: RemoteRobot, publish:
             DemonstrationLog(folder / LABELS, profile, mirrored=method.mirrored) as log,
             RunWriter(folder / RECORD) as record,
         ):
-            record.write(head(args, profile, world.name))
-            journal = Journal(keep=log.append, write=record.write, publish=publish)
+            write = telling(say, record.write)
+            write(head(args, profile, world.name))
+            journal = Journal(keep=log.append, write=write, publish=publish)
             loop = ControlLoop(robot, truth=arena.state)
             session = Session(robot, arena, loop, journal, team.pupil, team.alone)
             loop.arm()
@@ -58,18 +60,17 @@ def teach(args: argparse.Namespace, method: Method, robot: RemoteRobot, publish:
                 converged = session.prove(course)
             else:
                 converged = session.teach(course, hand, args.train_laps)
-                snapshot(folder, team.pupil.novice, profile, args)()
+                say(snapshot(folder, team.pupil.novice, profile, args)())
             session.show(unseen(args, profile, world), hand if team.answered else None)
-            record.write(session.result(converged))
+            write(session.result(converged))
     return 0 if converged else 1
 
 
-def examine(args: argparse.Namespace, robot: RemoteRobot, publish: Publish, say: Callable[[str], None]) -> int:
+def examine(args: argparse.Namespace, robot: RemoteRobot, publish: Publish, say: Say) -> int:
     """Let a policy drive the layouts after `args.layout`; after a crash it goes on behind it. Returns 1 for any."""
     with arena_of(args, robot) as (arena, world):
         policy = load_expert(args.policy, robot.profile, args.experts or task_of(world.name))
-        progress = Progress()
-        journal = Journal(write=lambda record: _say_if(progress.note(record), say), publish=publish)
+        journal = Journal(write=telling(say), publish=publish)
         loop = ControlLoop(robot, truth=arena.state)
         session = Session(robot, arena, loop, journal, None, lambda _: Alone(policy.name, policy.act))
         loop.arm()
@@ -104,6 +105,15 @@ def _world(info: bytes) -> World:
     return world
 
 
-def _say_if(line: str | None, say: Callable[[str], None]) -> None:
-    if line is not None:
-        say(line)
+def telling(say: Say, write: Callable[[Record], None] | None = None) -> Callable[[Record], None]:
+    """Return what says how each lap went, and writes every record if there is where to."""
+    progress = Progress()
+
+    def take(record: Record) -> None:
+        if write is not None:
+            write(record)
+        line = progress.note(record)
+        if line is not None:
+            say(line)
+
+    return take

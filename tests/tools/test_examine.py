@@ -1,4 +1,4 @@
-"""`lira fusion --policy FILE --unseen N`: a policy drives a twin's layouts alone, and is told how each went."""
+"""`lira fusion` on a twin: a policy that drives layouts alone, and a scripted teacher; how each lap went is told."""
 
 import uuid
 
@@ -14,18 +14,20 @@ from tools.processes import ChildProcess, free_port, lira_command
 CAMERA = str(shipped_path("camera", load_profile("thesis-sim")))
 
 
-@pytest.fixture
-def examine(tmp_path, capsys):
-    """Let the camera expert drive two layouts of a world over the bus; return the exit status and what is printed."""
+EXAM = ("--policy", CAMERA, "--layout", "6", "--unseen", "2")
 
-    def run(world):
+
+@pytest.fixture
+def fusion(tmp_path, capsys):
+    """Run `lira fusion` on a twin in lockstep; return the exit status and what is printed."""
+
+    def run(world, *words):
         address = f"127.0.0.1:{free_port()}"
         name = f"t{uuid.uuid4().hex}"
         command = lira_command("twin", "--lockstep", "--name", name, "--listen", address, "--world", world)
         with ChildProcess("twin", command, tmp_path / "twin.log") as twin:
             twin.wait_ready("twin", 30.0)
-            words = ["--name", name, "--connect", address, "--policy", CAMERA, "--layout", "6", "--unseen", "2"]
-            status = cli.main(["fusion", *words])
+            status = cli.main(["fusion", "--name", name, "--connect", address, *words])
         return status, capsys.readouterr().out.splitlines()
 
     threads = torch.get_num_threads()
@@ -33,16 +35,25 @@ def examine(tmp_path, capsys):
     torch.set_num_threads(threads)  # the verb sets it for its whole process
 
 
-def test_each_layout_is_told(examine, tmp_path):
+def test_each_layout_is_told(fusion, tmp_path):
     path = tmp_path / "free.toml"
     path.write_text(SHORT.replace("y_m = 0.1", "y_m = 9.0"))
-    status, lines = examine(str(path))
+    status, lines = fusion(str(path), *EXAM)
     assert status == 0
     assert [line.split()[:4] for line in lines] == [["unseen", "layout", str(k), "passed"] for k in (7, 8)]
 
 
-def test_a_policy_that_hits_a_box_has_failed(examine, tmp_path):
-    status, lines = examine(write_world(tmp_path))
+def test_a_policy_that_hits_a_box_has_failed(fusion, tmp_path):
+    status, lines = fusion(write_world(tmp_path), *EXAM)
     assert status == 1
     assert len(lines) == 2
     assert all("failed" in line and "collisions 1" in line for line in lines)
+
+
+def test_a_scripted_lesson_is_told_lap_by_lap(fusion, tmp_path):
+    words = ("--method", "hg-dagger", "--teacher", "perfect", "--train-laps", "1", "--run", str(tmp_path / "run"))
+    _, lines = fusion(write_world(tmp_path), *words)
+    assert lines[0].startswith("hg-dagger (hg-dagger) on ")
+    assert [line.split()[0] for line in lines[1:3]] == ["training", "proving"]
+    assert any(line.startswith("saved ") and "the novice after" in line for line in lines)
+    assert "after 1 training laps" in lines[-1]

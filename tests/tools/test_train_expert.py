@@ -61,3 +61,10 @@ def test_a_place_that_cannot_be_written_is_named_before_the_training(tmp_path, c
     (tmp_path / "file").write_text("")
     assert cli.main(["train-expert", "lidar", "--out", str(tmp_path / "file" / "expert.safetensors")]) == 2
     assert "cannot write" in capsys.readouterr().err
+
+
+def test_a_task_that_borrows_its_lidar_expert_trains_none(capsys):
+    assert cli.main(["train-expert", "lidar", "--task", "corridor"]) == 2
+    what, remedy = capsys.readouterr().err.splitlines()
+    assert "uses that of 'garden'" in what
+    assert "--task garden" in remedy

@@ -20,7 +20,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from fusion.tasks import task_of
+from fusion.tasks import TASKS, task_of
 from hal.errors import ConfigError
 from tools.arguments import natural
 
@@ -47,8 +47,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add(
         "--experts",
         metavar="PAIR",
-        help="whose experts: a task (line, passage, garden, corridor), TASK@SEED, or a folder with camera.safetensors "
-        "and lidar.safetensors (default: those of a twin's world; line)",
+        help=f"whose experts: a task ({', '.join(TASKS)}), TASK@SEED, or a folder with camera.safetensors and "
+        "lidar.safetensors (default: those of a twin's world; line)",
     )
     what.add_argument(
         "--method",
@@ -106,7 +106,7 @@ def run(args: argparse.Namespace) -> int:
             return learn_by_hand(args, robot)
         from tools.arena import teach
 
-        return teach(args, method_of(args), robot, publisher(robot))
+        return teach(args, method_of(args), robot, publisher(robot), say)
     finally:
         robot.close()
         bus.close()

@@ -19,7 +19,7 @@ import os
 from pathlib import Path
 
 from fusion.tasks import DEFAULT, TASKS
-from hal.errors import LiraError, StorageError
+from hal.errors import ConfigError, LiraError, StorageError
 from tools.arguments import natural
 
 
@@ -38,6 +38,10 @@ def run(args: argparse.Namespace) -> int:
     from hal.profile import load_profile
     from tools.training import command, train_expert
 
+    owner = TASKS[args.task].lidar
+    if args.expert == "lidar" and owner != args.task:
+        what = f"the task '{args.task}' has no lidar expert of its own: it uses that of '{owner}'"
+        raise ConfigError(what, f"Train that one with --task {owner}.")
     profile = load_profile(args.profile or TASKS[args.task].profile)
     path = args.out or shipped_path(args.expert, profile, args.task)
     try:
