@@ -49,6 +49,12 @@ _HEAVY = LearningSettings(labels_per_step=10, human_weight=3.0)
 _M10 = LearningSettings(labels_per_step=10)
 _BOTH: tuple[Sensor, ...] = ("camera", "lidar")
 
+
+def _plus(name: str, *, learning: LearningSettings = _HEAVY, mirrored: bool = True, **changes: float | None) -> Method:
+    """Return `plus` with changes to its settings."""
+    return Method(name, msgspec.structs.replace(PlusSettings(), **changes), learning, mirrored=mirrored)
+
+
 METHODS = {
     method.name: method
     for method in (
@@ -60,16 +66,16 @@ METHODS = {
         Method("thesis-flexible", PRESETS["thesis"], sharing=SharingSettings(when="flexible")),
         Method("hold-scratch", _HOLD, trunks="scratch"),
         Method("hold-mirrored", _HOLD, mirrored=True),
-        Method("plus", PlusSettings(), _HEAVY, mirrored=True),
-        Method("plus-no-prefill", PlusSettings(prefill=0), _HEAVY, mirrored=True),
-        Method("plus-no-reserve", PlusSettings(reserve_s=0.0), _HEAVY, mirrored=True),
-        Method("plus-no-weight", PlusSettings(), _M10, mirrored=True),
-        Method("plus-no-mirror", PlusSettings(), _HEAVY),
-        Method("plus-no-wheel", PlusSettings(wheel_s=0.0), _HEAVY, mirrored=True),
-        Method("plus-no-memory", PlusSettings(recall=None), _HEAVY, mirrored=True),
-        Method("plus-no-confidence", PlusSettings(sure=None), _HEAVY, mirrored=True),
-        Method("plus-no-at-once", PlusSettings(at_once=0), _HEAVY, mirrored=True),
-        Method("plus-m30", PlusSettings(), LearningSettings(human_weight=3.0), mirrored=True),
+        _plus("plus"),
+        _plus("plus-no-prefill", prefill=0),
+        _plus("plus-no-reserve", reserve_s=0.0),
+        _plus("plus-no-weight", learning=_M10),
+        _plus("plus-no-mirror", mirrored=False),
+        _plus("plus-no-wheel", wheel_s=0.0),
+        _plus("plus-no-memory", recall=None),
+        _plus("plus-no-confidence", sure=None),
+        _plus("plus-no-at-once", at_once=0),
+        _plus("plus-m30", learning=LearningSettings(human_weight=3.0)),
         Method("hg-dagger", _HG, trunks="scratch"),
         Method("hg-dagger-m10", _HG, _M10, trunks="scratch"),
         Method("hg-dagger-mirrored", _HG, trunks="scratch", mirrored=True),

@@ -31,6 +31,7 @@ from tools.assembly import crew, lap, teacher
 from tools.progress import Progress
 from tools.run_folder import LABELS, RECORD, head, snapshot
 
+NO_TWIN = "Here, a person teaches (--teacher none), and a policy drives without --unseen."
 Publish = Callable[[Decision], None]
 Say = Callable[[str], None]
 
@@ -67,7 +68,7 @@ def teach(args: argparse.Namespace, method: Method, robot: RemoteRobot, publish:
 
 
 def examine(args: argparse.Namespace, robot: RemoteRobot, publish: Publish, say: Say) -> int:
-    """Let a policy drive the layouts after `args.layout`; after a crash it goes on behind it. Returns 1 for any."""
+    """Let a policy drive the layouts after `args.layout`; it goes on behind a crash. Returns 1 if any failed."""
     with arena_of(args, robot) as (arena, world):
         policy = load_expert(args.policy, robot.profile, args.experts or task_of(world.name))
         journal = Journal(write=telling(say), publish=publish)
@@ -101,7 +102,7 @@ def unseen(args: argparse.Namespace, profile: RobotProfile, world: World) -> lis
 def _world(info: bytes) -> World:
     world = msgspec.json.decode(info, type=World | None)
     if world is None:
-        raise ConfigError("only a twin shows layouts to a policy or a scripted teacher", "Use a gamepad here.")
+        raise ConfigError("only a twin has layouts to drive, and shows a teacher where the robot is", NO_TWIN)
     return world
 
 
