@@ -122,8 +122,11 @@ class Connection:
 
 def _lost_a_link(events: Any) -> bool:
     lost = False
-    while (event := events.try_recv()) is not None:
-        lost |= event.kind == zenoh.SampleKind.DELETE
+    try:
+        while (event := events.try_recv()) is not None:
+            lost |= event.kind == zenoh.SampleKind.DELETE
+    except zenoh.ZError:  # the session was closed, and all its links with it
+        return True
     return lost
 
 

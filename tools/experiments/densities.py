@@ -9,11 +9,11 @@ from hal.messages import Action
 from tools.experiments.compare import trials
 from tools.experiments.experiment import Experiment, Finding, Outcomes, Picture, Row, Table
 from tools.experiments.measures import by_method
-from tools.experiments.methods import HG_DAGGER, LIRA
+from tools.experiments.methods import USUAL
 from tools.experiments.trial import Outcome
 from tools.report.plots import BINS
 
-METHODS = (*LIRA, HG_DAGGER[0])
+METHODS = USUAL[:3]
 HUMAN = ("human", "demonstration")
 FULL = 0.9  # from here on an action is full speed, or full steer
 STRAIGHT = 0.1  # up to here it goes straight on; between the two lies the mid-range

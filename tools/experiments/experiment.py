@@ -58,7 +58,8 @@ class Experiment:
 
     `trials(seeds)` lists what is run for seeds 0, 1, ... `seeds - 1`. `ratios` are rows of `method`, `against`,
     `quantity`, `median`, `low`, `high`, `n`, `censored`, for experiments that compare methods pair by pair.
-    `methods` are those of which some may be played alone; none where only all together say something.
+    `methods` are those of which some may be played alone, and `usual` those that are if nothing is said; none where only
+    all together say something.
     """
 
     trials: Callable[[int], list[Trial]]
@@ -67,3 +68,4 @@ class Experiment:
     figures: Callable[[Outcomes], list[Picture]] = lambda _: []
     ratios: Callable[[Outcomes], list[Row]] = lambda _: []
     methods: tuple[str, ...] = ()
+    usual: tuple[str, ...] = ()

@@ -7,3 +7,6 @@ HG_DAGGER = tuple(
     METHODS[f"hg-dagger{kind}"] for kind in ("", "-m10", "-trunks", "-warm", "-warm-m10", "-warm-m10-mirrored")
 )
 FLOORS = tuple(METHODS[name] for name in ("cloning", "switching"))  # no interaction, no learning
+ALL = (*LIRA, *HG_DAGGER, *FLOORS)
+# The thesis's two, what goes beyond them, and the rival that is fairest to it: played where no others are asked for.
+USUAL = tuple(METHODS[name] for name in ("hold", "plus", "hg-dagger", "hg-dagger-warm-m10"))

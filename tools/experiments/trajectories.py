@@ -8,11 +8,11 @@ import numpy as np
 from tools.experiments.compare import trials
 from tools.experiments.experiment import Experiment, Finding, Outcomes, Picture, Row, Table
 from tools.experiments.measures import by_method, known, method_rows, time_to_finish_s
-from tools.experiments.methods import HG_DAGGER, LIRA
+from tools.experiments.methods import USUAL
 from tools.experiments.notes import Track
 from tools.experiments.trial import Outcome
 
-METHODS = (*LIRA, HG_DAGGER[0])
+METHODS = USUAL[:3]
 
 
 def final(outcome: Outcome) -> Track | None:

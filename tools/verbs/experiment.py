@@ -9,14 +9,13 @@ used by then. The folder also gets a page (NAME.html) and the drawings.
 
 examples:
   lira experiment table2 --seeds 10 --workers 2
-  lira experiment table2 --seeds 10 --workers 2 --methods hold,hg-dagger
+  lira experiment table2 --seeds 10 --workers 2 --methods hold,hg-dagger    # all: every method
   lira experiment race --seeds 10 --scheduler tcp://192.168.1.5:8786 --json race.json
   lira experiment all --seeds 10 --workers 2
   lira experiment results
 """
 
 import argparse
-from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -24,6 +23,7 @@ from hal.errors import ConfigError
 from tools.experiments.registry import REGISTRY, load
 
 if TYPE_CHECKING:
+    from tools.experiments.experiment import Experiment
     from tools.experiments.summary import Summary
 
 FOLDER = Path("runs") / "experiments"
@@ -36,7 +36,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add = parser.add_argument
     add("name", choices=[*REGISTRY, ALL, RESULTS], metavar="NAME", help=f"{names}; {ALL}; {RESULTS}")
     add("--seeds", type=int, default=3, help="repetitions, seeds 0, 1, 2, ... (default: %(default)s)")
-    add("--methods", metavar="NAMES", help="of table2 and race, play only these, separated by commas")
+    add("--methods", metavar="NAMES", help=f"of table2 and race, play these, separated by commas, or {ALL} (default: few)")
     add(
         "--experts",
         metavar="PAIR",
@@ -83,28 +83,35 @@ def play(args: argparse.Namespace, name: str) -> "tuple[Summary, Path]":
 
     experiment = load(name)
     pool = Here(args.workers) if args.scheduler is None else Cluster(args.scheduler)
-    chosen = chosen_methods(args.methods, experiment.methods, name)
+    methods = ALL if args.name == ALL and experiment.methods else args.methods
+    chosen = chosen_methods(methods, experiment, name)
     trials = [trial for trial in experiment.trials(args.seeds) if not chosen or trial.method.name in chosen]
     if args.experts is not None:
         trials = [msgspec.structs.replace(each, experts=each.experts or args.experts) for each in trials]
     for pair in dict.fromkeys(trial.pair for trial in trials):
         provide(pair)
     outcomes = run_trials(trials, args.run, pool)
-    command = f"lira experiment {name} --seeds {args.seeds}" + (f" --methods {args.methods}" if chosen else "")
+    command = f"lira experiment {name} --seeds {args.seeds}" + ("" if methods is None else f" --methods {methods}")
     command += "" if args.experts is None else f" --experts {args.experts}"
     summary = summarise(name, REGISTRY[name].words, command, args.seeds, experiment, outcomes)
     return summary, write_page(args.run, summary, experiment.figures(outcomes))
 
 
-def chosen_methods(words: str | None, known: Sequence[str], name: str) -> set[str]:
-    """Return the methods that were asked for; nothing means all. Raises `ConfigError`."""
+def chosen_methods(words: str | None, experiment: "Experiment", name: str) -> set[str]:
+    """Return the methods that were asked for, or the usual ones; nothing where there is no choice.
+
+    Raises `ConfigError`.
+    """
+    known = experiment.methods
     if words is None:
-        return set()
+        return set(experiment.usual)
     if not known:
         raise ConfigError(f"{name} takes no --methods", "It needs all of its methods together.")
+    if words == ALL:
+        return set(known)
     chosen = set(words.split(","))
     if not chosen <= set(known):
-        raise ConfigError(f"{name} has no method '{min(chosen - set(known))}'", f"Known: {', '.join(known)}.")
+        raise ConfigError(f"{name} has no method '{min(chosen - set(known))}'", f"Known: {', '.join(known)}; or {ALL}.")
     return chosen
 
 
