@@ -11,8 +11,10 @@ import pytest
 from wiring import new_endpoint, new_name, wait_for
 
 from hal.bus import Bus
+from hal.connection import Connection
 from hal.errors import BusError
 from hal.messages import STOP, Applied, BatteryState, Twist
+from hal.session import open_session
 from hal.topics import APPLIED, BATTERY, CMD_VEL
 from tools import relay
 
@@ -155,4 +157,20 @@ def test_whoever_connects_too_early_keeps_trying():
     robot = Bus(name, listen=endpoint)
     assert hears(robot.publisher(APPLIED), Applied(STOP, 0.0), results)
     assert client.close()
+    assert robot.close()
+
+
+def test_a_session_that_is_closed_is_replaced():
+    name, endpoint = new_name(), new_endpoint()
+    robot = Bus(name, listen=endpoint)
+
+    def session(connect=None):
+        return open_session(name, None, connect, None)
+
+    connection = Connection(session, lambda: session(endpoint))
+    assert connection.wait_up(5.0)
+    first = connection.session
+    first.close()
+    wait_for(lambda: connection.session is not first and robot.peers() == 1)
+    assert connection.close(5.0)
     assert robot.close()

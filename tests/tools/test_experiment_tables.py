@@ -17,6 +17,7 @@ from tools.experiments.page import write_page
 from tools.experiments.registry import REGISTRY, load
 from tools.experiments.summary import read_summary, summarise, to_json
 from tools.experiments.trial import Trial
+from tools.verbs.experiment import chosen_methods
 
 
 def test_labels_of_a_group_in_the_columns_of_table_2():
@@ -270,6 +271,8 @@ def test_some_methods_may_be_played_alone(capsys, tmp_path):
     where = ["--run", str(tmp_path), "--methods", f"{HOLD},hg"]
     assert main(["experiment", "race", *where]) == 2
     assert "race has no method 'hg'" in capsys.readouterr().err
+    assert chosen_methods(None, race, "race") == {"hold", "plus", "hg-dagger", "hg-dagger-warm-m10"}
+    assert chosen_methods("all", race, "race") > {"thesis", "cloning", "switching"}
     for name in ("tableC1", "all"):
         assert main(["experiment", name, *where]) == 2
         assert f"{name} takes no --methods" in capsys.readouterr().err

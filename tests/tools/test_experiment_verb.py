@@ -54,7 +54,7 @@ def test_all_experiments_end_in_results(short_race, tmp_path):
     where = ["--summaries", str(tmp_path / "summaries"), "--out", str(out)]
     assert main(["experiment", "all", *short_race, *where]) == 0
     text = out.read_text()
-    assert "`lira experiment race --seeds 1`: 2 trials." in text
+    assert "`lira experiment race --seeds 1 --methods all`: 2 trials." in text
     assert [path.name for path in (tmp_path / "summaries").iterdir()] == ["race.json"]
     out.unlink()
     assert main(["experiment", "results", *where]) == 0

@@ -9,11 +9,12 @@ from hal.messages import Action
 from tools.experiments.compare import trials
 from tools.experiments.experiment import Experiment, Finding, Outcomes, Picture, Row, Table
 from tools.experiments.measures import by_method
-from tools.experiments.methods import USUAL
+from tools.experiments.methods import HG_DAGGER, LIRA, USUAL
 from tools.experiments.trial import Outcome
 from tools.report.plots import BINS
 
-METHODS = USUAL[:3]
+FUSED = tuple(method for method in USUAL if method in LIRA)
+METHODS = (*FUSED, HG_DAGGER[0])
 HUMAN = ("human", "demonstration")
 FULL = 0.9  # from here on an action is full speed, or full steer
 STRAIGHT = 0.1  # up to here it goes straight on; between the two lies the mid-range
@@ -73,7 +74,7 @@ def findings(outcomes: Outcomes) -> list[Finding]:
     groups = {method: by_source(group) for method, group in by_method(outcomes).items()}
     hg_dagger = groups[HG_DAGGER[0].name]["human"]
     found = []
-    for name in (each.name for each in LIRA):
+    for name in (each.name for each in FUSED):
         human, experts = groups[name]["human"], groups[name]["experts"]
         everyone = [*human, *experts]
         full = float(np.mean([linear >= FULL for linear, _ in everyone]))
@@ -133,7 +134,7 @@ def figures(outcomes: Outcomes) -> list[Picture]:
         Picture(
             name, f"{name}: labels by source (thesis, E.4)", partial(plots.densities, by_source(groups[name]), runs)
         )
-        for name in (each.name for each in LIRA)
+        for name in (each.name for each in FUSED)
     ]
     everyone = {
         each.name: [action for labels in by_source(groups[each.name]).values() for action in labels] for each in METHODS

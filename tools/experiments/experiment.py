@@ -58,8 +58,8 @@ class Experiment:
 
     `trials(seeds)` lists what is run for seeds 0, 1, ... `seeds - 1`. `ratios` are rows of `method`, `against`,
     `quantity`, `median`, `low`, `high`, `n`, `censored`, for experiments that compare methods pair by pair.
-    `methods` are those of which some may be played alone, and `usual` those that are if nothing is said; none where only
-    all together say something.
+    `methods` are those of which some may be played alone, and `usual` those that are if nothing is said; none where
+    only all together say something.
     """
 
     trials: Callable[[int], list[Trial]]

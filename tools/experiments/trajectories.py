@@ -6,13 +6,11 @@ from functools import partial
 import numpy as np
 
 from tools.experiments.compare import trials
+from tools.experiments.densities import METHODS
 from tools.experiments.experiment import Experiment, Finding, Outcomes, Picture, Row, Table
 from tools.experiments.measures import by_method, known, method_rows, time_to_finish_s
-from tools.experiments.methods import USUAL
 from tools.experiments.notes import Track
 from tools.experiments.trial import Outcome
-
-METHODS = USUAL[:3]
 
 
 def final(outcome: Outcome) -> Track | None:

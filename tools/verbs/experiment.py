@@ -36,7 +36,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add = parser.add_argument
     add("name", choices=[*REGISTRY, ALL, RESULTS], metavar="NAME", help=f"{names}; {ALL}; {RESULTS}")
     add("--seeds", type=int, default=3, help="repetitions, seeds 0, 1, 2, ... (default: %(default)s)")
-    add("--methods", metavar="NAMES", help=f"of table2 and race, play these, separated by commas, or {ALL} (default: few)")
+    add(
+        "--methods",
+        metavar="NAMES",
+        help=f"of table2 and race, play these, separated by commas, or {ALL} (default: four)",
+    )
     add(
         "--experts",
         metavar="PAIR",
