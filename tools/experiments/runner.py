@@ -74,5 +74,5 @@ def line(outcome: Outcome) -> str:
     how = f"converged after {result.laps} laps" if result.converged else f"not converged in {result.laps} laps"
     return (
         f"{Path(trial.world).stem} {trial.method.name} {trial.teacher} seed {trial.seed}: {how}, "
-        f"{result.human_labels} human labels, {result.interventions} interventions"
+        f"{result.human_labels} human labels, {result.interventions} interventions; {result.elapsed_s:.0f} s"
     )
