@@ -104,7 +104,7 @@ class Connection:
             self._replace(session)
             self._up.set()
             while not self._closed.wait(LOOK_S):
-                if _lost_a_link(events):
+                if _lost_a_link(events) and not self.closed:
                     with contextlib.suppress(BusError):  # then the lost one stays until the next is up
                         self._replace(self._idle())
                     break
