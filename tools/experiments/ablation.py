@@ -1,9 +1,9 @@
 """What each part of `plus` is worth: left out one by one on line-obstacles, with experts no choice was made on."""
 
 from fusion.presets import METHODS
+from tools.experiments import pairs
 from tools.experiments.experiment import Experiment, Outcomes, Picture, Row, Table
 from tools.experiments.measures import driving_row, effort_row, label_row, method_rows
-from tools.experiments.pairs import ratio
 from tools.experiments.pictures import box_pictures
 from tools.experiments.trial import Outcome, Trial
 
@@ -29,12 +29,7 @@ def by_name(outcomes: Outcomes) -> dict[str, list[Outcome]]:
 
 def ratios(outcomes: Outcomes) -> list[Row]:
     """Without a part over with all of them, pair by pair of one seed and one pair of experts."""
-    groups = by_name(outcomes)
-    return [
-        {"method": BASE, "against": name, "quantity": quantity} | ratio(groups[name], groups[BASE], quantity)
-        for name in NAMES[1:]
-        for quantity in (*QUANTITIES, "calls")
-    ]
+    return pairs.ratios(by_name(outcomes), [(BASE, name) for name in NAMES[1:]], (*QUANTITIES, "calls"))
 
 
 def tables(outcomes: Outcomes) -> list[Table]:

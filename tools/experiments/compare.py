@@ -4,6 +4,7 @@ from collections.abc import Sequence
 from functools import partial
 
 from fusion.tasks import task_of
+from tools.experiments import pairs
 from tools.experiments.experiment import Experiment, Finding, Outcomes, Picture, Row, Table
 from tools.experiments.measures import (
     by_method,
@@ -15,7 +16,7 @@ from tools.experiments.measures import (
     source_rows,
 )
 from tools.experiments.methods import ALL, HG_DAGGER, LIRA, USUAL
-from tools.experiments.pairs import TOTAL, bounds, ratio, words
+from tools.experiments.pairs import TOTAL, bounds, words
 from tools.experiments.pictures import box_pictures, spelt
 from tools.experiments.trial import Trial
 
@@ -59,15 +60,8 @@ def summary(outcomes: Outcomes) -> list[Row]:
 
 def ratios(outcomes: Outcomes, quantities: Sequence[str] = QUANTITIES) -> list[Row]:
     """HG-DAgger over LIRA-SPF, pair by pair of one seed."""
-    groups = by_method(outcomes)
-    return [
-        {"method": method.name, "against": against.name, "quantity": quantity}
-        | ratio(groups[against.name], groups[method.name], quantity)
-        for method in LIRA
-        for against in HG_DAGGER
-        if method.name in groups and against.name in groups
-        for quantity in quantities
-    ]
+    compared = [(method.name, against.name) for method in LIRA for against in HG_DAGGER]
+    return pairs.ratios(by_method(outcomes), compared, quantities)
 
 
 def amortised(outcomes: Outcomes) -> list[Row]:

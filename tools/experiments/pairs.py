@@ -1,6 +1,6 @@
 """Trials of one seed are pairs: ratios of what two methods, or two teachers, took, with 95 % intervals."""
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Mapping, Sequence
 
 from tools.experiments.experiment import Row
 from tools.experiments.statistics import median_interval, paired_ratios
@@ -26,6 +26,18 @@ def ratio(numerator: Sequence[Outcome], denominator: Sequence[Outcome], quantity
     pairs = zip(numerator, denominator, strict=True)
     censored = sum(not (a.result.converged and b.result.converged) for a, b in pairs)
     return {"median": median, "low": low, "high": high, "n": len(values), "censored": censored}
+
+
+def ratios(
+    groups: Mapping[str, Sequence[Outcome]], names: Iterable[tuple[str, str]], quantities: Sequence[str]
+) -> list[Row]:
+    """Second over first for each pair of methods that were played, one row per quantity: `Experiment.ratios`."""
+    return [
+        {"method": method, "against": against, "quantity": quantity} | ratio(groups[against], groups[method], quantity)
+        for method, against in names
+        if method in groups and against in groups
+        for quantity in quantities
+    ]
 
 
 def bounds(row: Row) -> tuple[float, float]:

@@ -1,9 +1,10 @@
 """Table D.1: LIRA-SPF with shared feedback on the figure-eight with boxes, at 0.5 m/s."""
 
 from fusion.presets import METHODS
+from tools.experiments import pairs
 from tools.experiments.experiment import Experiment, Finding, Outcomes, Picture, Row, Table
 from tools.experiments.measures import by_method, driving_row, effort_row, label_row, method_rows
-from tools.experiments.pairs import bounds, ratio, words
+from tools.experiments.pairs import bounds, words
 from tools.experiments.pictures import box_pictures, spelt
 from tools.experiments.trial import Trial
 
@@ -26,13 +27,8 @@ def trials(seeds: int) -> list[Trial]:
 
 def ratios(outcomes: Outcomes) -> list[Row]:
     """Fixed over flexible, pair by pair of one seed."""
-    groups = by_method(outcomes)
-    return [
-        {"method": f"{preset}-flexible", "against": f"{preset}-fixed", "quantity": quantity}
-        | ratio(groups[f"{preset}-fixed"], groups[f"{preset}-flexible"], quantity)
-        for preset in PRESETS
-        for quantity in QUANTITIES
-    ]
+    compared = [(f"{preset}-flexible", f"{preset}-fixed") for preset in PRESETS]
+    return pairs.ratios(by_method(outcomes), compared, QUANTITIES)
 
 
 def tables(outcomes: Outcomes) -> list[Table]:

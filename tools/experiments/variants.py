@@ -1,9 +1,9 @@
 """What each choice within a method is worth: one thing differs from the base, on line-obstacles."""
 
 from fusion.presets import METHODS
+from tools.experiments import pairs
 from tools.experiments.experiment import Experiment, Outcomes, Picture, Row, Table
 from tools.experiments.measures import by_method, driving_row, effort_row, label_row, method_rows
-from tools.experiments.pairs import ratio
 from tools.experiments.pictures import box_pictures
 from tools.experiments.trial import Trial
 
@@ -24,13 +24,8 @@ def trials(seeds: int) -> list[Trial]:
 
 def ratios(outcomes: Outcomes) -> list[Row]:
     """Each variant over its base, pair by pair of one seed."""
-    groups = by_method(outcomes)
-    return [
-        {"method": base, "against": variant, "quantity": quantity} | ratio(groups[variant], groups[base], quantity)
-        for base, variants in VARIANTS.items()
-        for variant in variants
-        for quantity in QUANTITIES
-    ]
+    compared = [(base, variant) for base, variants in VARIANTS.items() for variant in variants]
+    return pairs.ratios(by_method(outcomes), compared, QUANTITIES)
 
 
 def tables(outcomes: Outcomes) -> list[Table]:
