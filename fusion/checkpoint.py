@@ -43,8 +43,10 @@ class Checkpoint:
 
 def save_checkpoint(path: Path, network: Network, checkpoint: Checkpoint) -> None:
     """Write a checkpoint whole or not at all. Raises `StorageError`."""
-    metadata = {_KEY: json.dumps(asdict(checkpoint))}
-    data = save(network.weights(), metadata)
+    about = asdict(checkpoint)
+    if not checkpoint.members:
+        del about["members"]  # which files had not before there were committees
+    data = save(network.weights(), {_KEY: json.dumps(about)})
     draft = path.with_name(f"{path.name}.{os.getpid()}.tmp")
     try:
         path.parent.mkdir(parents=True, exist_ok=True)

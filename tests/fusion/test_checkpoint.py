@@ -6,8 +6,10 @@ from safetensors.numpy import save_file
 
 from fusion.checkpoint import Checkpoint, load_checkpoint, save_checkpoint
 from fusion.ensemble import EnsembleNet
+from fusion.expert_files import shipped_path
 from fusion.networks import CameraNet, FusionNet, LidarNet
 from hal.errors import StorageError
+from hal.profile import load_profile
 
 SCAN = np.random.default_rng(0).random(101, dtype=np.float32)
 IMAGE = np.random.default_rng(1).random((32, 32), dtype=np.float32)
@@ -37,6 +39,13 @@ def test_what_is_saved_is_loaded(tmp_path, network, about):
     image = IMAGE[: about.px, : about.px].copy()
     assert loaded.act(SCAN, image) == network.act(SCAN, image)
     assert [entry.name for entry in path.parent.iterdir()] == ["one.safetensors"]
+
+
+def test_an_expert_that_comes_with_the_project_is_written_as_it_was(tmp_path):
+    shipped = shipped_path("camera", load_profile("thesis-sim"))
+    copy = tmp_path / "copy.safetensors"
+    save_checkpoint(copy, *load_checkpoint(shipped))
+    assert copy.read_bytes() == shipped.read_bytes()
 
 
 def test_a_missing_checkpoint_says_how_to_make_one(tmp_path):
