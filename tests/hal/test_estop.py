@@ -1,9 +1,7 @@
 """The emergency stop over the bus, and one commander at a time."""
 
-import threading
-
 import pytest
-from wiring import joined, real_time_null, remote, served, wait_for
+from wiring import StuckRobot, joined, real_time_null, remote, served, wait_for
 
 from hal.errors import BusError
 from hal.estop import look_at_estop, press_estop, release_estop
@@ -52,22 +50,12 @@ def test_the_latched_topic_presses_even_before_the_robot_is_there_and_false_rele
 
 
 def test_the_emergency_stop_answers_while_a_sensor_hangs():
-    leave = threading.Event()
-
-    class Stuck(NullRobot):
-        stuck = False
-
-        def read(self):
-            if self.stuck:
-                leave.wait(20.0)
-            return super().read()
-
-    with served(real_time_null(Stuck)) as robot, remote(robot) as client:
+    with served(real_time_null(StuckRobot)) as robot, remote(robot) as client:
         get_going(client)
-        robot.inner.stuck = True
+        robot.inner.hang()
         assert press_estop(client.bus).pressed
         assert robot.inner.state().linear_m_s == 0.0
-        leave.set()
+        robot.inner.go_on()
 
 
 def test_in_lockstep_it_holds_too():

@@ -8,7 +8,7 @@ import cv2
 import numpy as np
 import pytest
 import zenoh
-from wiring import PROFILE, joined, new_endpoint, new_name, real_time_null, remote, served, wait_for
+from wiring import PROFILE, StuckRobot, joined, new_endpoint, new_name, real_time_null, remote, served, wait_for
 
 from hal.bus import Bus, Publisher
 from hal.codec import encode
@@ -90,19 +90,9 @@ def test_what_is_stale_is_none():
 
 
 def test_a_sensor_that_never_answers_leaves_the_wheels_in_control():
-    leave = threading.Event()
-
-    class Stuck(NullRobot):
-        stuck = False
-
-        def read(self):
-            if self.stuck:
-                leave.wait(20.0)
-            return super().read()
-
-    with served(real_time_null(Stuck)) as robot, remote(robot) as client:
+    with served(real_time_null(StuckRobot)) as robot, remote(robot) as client:
         get_going(client)
-        robot.inner.stuck = True
+        robot.inner.hang()
         time.sleep(0.1)
         assert client.drive(Command(GO, client.now())).twist == GO
         wait_for(lambda: is_still(robot), DECISION_S + STOP_BUDGET_S + 0.5)
@@ -112,7 +102,7 @@ def test_a_sensor_that_never_answers_leaves_the_wheels_in_control():
         wait_for(lambda: is_still(robot), 1.0)
         robot.join()
         assert time.monotonic() - began_s < 6.0
-        leave.set()
+        robot.inner.go_on()
 
 
 def test_a_bus_that_takes_nothing_leaves_the_wheels_in_control(monkeypatch):

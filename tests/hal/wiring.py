@@ -8,6 +8,7 @@ from contextlib import contextmanager
 
 from hal.bus import Bus
 from hal.governed import GovernedRobot
+from hal.messages import Observation
 from hal.null import NullRobot
 from hal.profile import load_profile
 from hal.remote import RemoteRobot
@@ -27,6 +28,24 @@ def new_endpoint() -> str:
 
 def real_time_null(kind: type[NullRobot] = NullRobot) -> NullRobot:
     return kind(PROFILE, time.monotonic, time.sleep)
+
+
+class StuckRobot(NullRobot):
+    """Its sensors can be made to hang."""
+
+    _free: threading.Event | None = None
+
+    def hang(self) -> None:
+        self._free = threading.Event()
+
+    def go_on(self) -> None:
+        assert self._free is not None
+        self._free.set()
+
+    def read(self) -> Observation:
+        if self._free is not None:
+            self._free.wait(20.0)
+        return super().read()
 
 
 class Served:
