@@ -10,11 +10,9 @@ import msgspec
 from safetensors import SafetensorError, safe_open
 from safetensors.numpy import save
 
-from fusion.ensemble import EnsembleNet
 from fusion.networks import IMAGE_PX, CameraNet, FusionNet, Kind, LidarNet, Network
 from hal.errors import StorageError
 
-MAX_SIZE, MAX_MEMBERS = 4096, 64  # beyond, it is a broken file
 _KEY = "lira"  # the one metadata entry, JSON
 
 
@@ -25,7 +23,6 @@ class Checkpoint:
     `cruise` is an expert's measured action (linear, angular) on an empty straight course; `provenance` the command
     that made it. `bins`, `filters` and `px` are the sizes of the sensors' trunks, also for the one that is not used.
     `labels` and `training_steps` are what it took; None for a file that was written before they were counted.
-    `members` are those of a committee (`fusion.ensemble`) beside the network itself.
     """
 
     kind: Kind
@@ -38,15 +35,12 @@ class Checkpoint:
     px: int = IMAGE_PX
     labels: int | None = None
     training_steps: int | None = None
-    members: int = 0
 
 
 def save_checkpoint(path: Path, network: Network, checkpoint: Checkpoint) -> None:
     """Write a checkpoint whole or not at all. Raises `StorageError`."""
-    about = asdict(checkpoint)
-    if not checkpoint.members:
-        del about["members"]  # which files had not before there were committees
-    data = save(network.weights(), {_KEY: json.dumps(about)})
+    metadata = {_KEY: json.dumps(asdict(checkpoint))}
+    data = save(network.weights(), metadata)
     draft = path.with_name(f"{path.name}.{os.getpid()}.tmp")
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
@@ -86,16 +80,15 @@ def load_checkpoint(path: Path) -> tuple[Network, Checkpoint]:
 
 def build(checkpoint: Checkpoint) -> Network:
     """Make the network a checkpoint describes, with fresh weights."""
-    sizes = checkpoint.bins, checkpoint.filters, checkpoint.px
-    if not 0 < min(sizes) <= max(sizes) < MAX_SIZE or not 0 <= checkpoint.members <= MAX_MEMBERS:
-        raise ValueError(
-            f"a network of {checkpoint.bins} bins, {checkpoint.filters} filters, {checkpoint.members} members"
-        )
+    if (
+        not 0
+        < min(checkpoint.bins, checkpoint.filters, checkpoint.px)
+        <= max(checkpoint.bins, checkpoint.filters)
+        < 4096
+    ):
+        raise ValueError(f"a network of {checkpoint.bins} bins and {checkpoint.filters} filters")
     if checkpoint.kind == "camera":
         return CameraNet(checkpoint.filters, px=checkpoint.px, seed=checkpoint.seed)
     if checkpoint.kind == "lidar":
         return LidarNet(checkpoint.bins, seed=checkpoint.seed)
-    network = FusionNet(checkpoint.bins, checkpoint.filters, px=checkpoint.px, seed=checkpoint.seed)
-    if not checkpoint.members:
-        return network
-    return EnsembleNet(network, checkpoint.members, checkpoint.seed, committee=True)
+    return FusionNet(checkpoint.bins, checkpoint.filters, px=checkpoint.px, seed=checkpoint.seed)

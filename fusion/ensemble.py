@@ -1,7 +1,6 @@
 """A fusion network with an ensemble beside it: heads on the same trunks, each trained on a bootstrap of the labels.
 
-The ensemble is there to disagree; the novice's own layers learn exactly what they learn without it. As a committee they
-also drive together: the action is the mean of theirs and the novice's own, which varies less than any one of them.
+The ensemble is there to disagree, not to drive: the novice's own layers learn exactly what they learn without it.
 """
 
 import numpy as np
@@ -17,10 +16,10 @@ from hal.messages import FloatArray
 class EnsembleNet(FusionNet):
     """The novice, and `members` more heads: fusion layers of the same sizes, initialised from seeds of their own."""
 
-    def __init__(self, like: FusionNet, members: int, seed: int, *, committee: bool = False) -> None:
+    def __init__(self, like: FusionNet, members: int, seed: int) -> None:
         super().__init__(like.lidar.bins, like.camera.filters, px=like.camera.px)
         self.load_state_dict(like.state_dict())
-        self.members, self.committee = members, committee
+        self.members = members
         heads = [
             FusionNet(like.lidar.bins, like.camera.filters, px=like.camera.px, seed=one)
             for one in np.random.default_rng(seed).integers(2**31, size=members).tolist()
@@ -37,12 +36,6 @@ class EnsembleNet(FusionNet):
         alone = FusionNet(self.lidar.bins, self.camera.filters, px=self.camera.px)
         alone.load_state_dict({name: value for name, value in self.state_dict().items() if name in alone.state_dict()})
         return alone
-
-    def forward(self, scan: Tensor, image: Tensor) -> Tensor:
-        """As `Network.forward`: the novice's own actions [n, 2], or the committee's."""
-        trunk = self.trunk(scan, image)
-        own = self.head(trunk)
-        return torch.cat([own[None], self.member_heads(trunk)]).mean(dim=0) if self.committee else own
 
     def member_heads(self, features: Tensor) -> Tensor:
         """Trunk output [n, size] -> what each member would do [members, n, 2]. No gradient reaches the trunks."""

@@ -26,8 +26,7 @@ class Method(msgspec.Struct, frozen=True):
     `trunks`: "frozen" copies of the experts' trunks, or "scratch" (everything is learned). HG-DAgger and cloning know
     no experts, so they learn from scratch; variants of HG-DAgger that profit from experts say so in their name.
     `warm` names the experts that teach the novice what they do on their own training course before any human does.
-    `mirrored` learns every label once more with left and right exchanged. `committee` lets so many policies drive
-    together with the novice's own (`fusion.ensemble`). `sharing` adds Appendix D to LIRA-SPF.
+    `mirrored` learns every label once more with left and right exchanged. `sharing` adds Appendix D to LIRA-SPF.
     """
 
     name: str
@@ -36,7 +35,6 @@ class Method(msgspec.Struct, frozen=True):
     trunks: Literal["frozen", "scratch"] = "frozen"
     warm: tuple[Sensor, ...] = ()
     mirrored: bool = False
-    committee: int = 0
     sharing: SharingSettings | None = None
 
     @property
@@ -49,21 +47,12 @@ _HOLD = PRESETS["hold"]
 _HG = HgDaggerSettings()
 _HEAVY = LearningSettings(labels_per_step=10, human_weight=3.0)
 _M10 = LearningSettings(labels_per_step=10)
-_COMMITTEE = 5
 _BOTH: tuple[Sensor, ...] = ("camera", "lidar")
 
 
-def _plus(
-    name: str,
-    *,
-    learning: LearningSettings = _HEAVY,
-    mirrored: bool = True,
-    committee: int = _COMMITTEE,
-    **changes: float | None,
-) -> Method:
+def _plus(name: str, *, learning: LearningSettings = _HEAVY, mirrored: bool = True, **changes: float | None) -> Method:
     """Return `plus` with changes to its settings."""
-    approach = msgspec.structs.replace(PlusSettings(), **changes)
-    return Method(name, approach, learning, mirrored=mirrored, committee=committee)
+    return Method(name, msgspec.structs.replace(PlusSettings(), **changes), learning, mirrored=mirrored)
 
 
 METHODS = {
@@ -82,7 +71,6 @@ METHODS = {
         _plus("plus-no-reserve", reserve_s=0.0),
         _plus("plus-no-weight", learning=_M10),
         _plus("plus-no-mirror", mirrored=False),
-        _plus("plus-no-committee", committee=0),
         _plus("plus-no-wheel", wheel_s=0.0),
         _plus("plus-no-memory", recall=None),
         _plus("plus-no-confidence", sure=None),
@@ -96,7 +84,6 @@ METHODS = {
         Method("hg-dagger-warm", _HG, warm=_BOTH),
         Method("hg-dagger-warm-m10", _HG, _M10, warm=_BOTH),
         Method("hg-dagger-warm-m10-mirrored", _HG, _M10, warm=_BOTH, mirrored=True),
-        Method("hg-dagger-warm-m10-committee", _HG, _M10, warm=_BOTH, mirrored=True, committee=_COMMITTEE),
         Method("cloning", CloningSettings(), LearningSettings(filter_human=False), trunks="scratch"),
         Method("switching", SwitchingSettings()),
     )

@@ -85,9 +85,9 @@ def apprentice(
         else FusionNet(lidar.trunk.bins, shape.filters, px=shape.px, seed=seed)
     )
     ensemble: EnsembleNet | None = None
-    members = max(method.committee, _ensemble(approach))
+    members = _ensemble(approach)
     if members:
-        network = ensemble = EnsembleNet(network, members, seed, committee=method.committee > 0)
+        network = ensemble = EnsembleNet(network, members, seed)
     learner = Learner(network, seed=seed, frozen_trunks=frozen, mirrored=method.mirrored)
     novice = Novice(network, trainer(learner), method.learning)
     warm_up(novice, method.warm, profile, pair)

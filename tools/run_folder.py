@@ -48,12 +48,10 @@ def snapshot(
     `sync` makes sure of the labels. The writing raises `StorageError`.
     """
     labels, steps, network = novice.stored, novice.training_steps, copy.deepcopy(novice.network)
-    members = 0
     if isinstance(network, EnsembleNet):
-        members = network.members if network.committee else 0
-        network = network if members else network.novice()
+        network = network.novice()
     sizes = profile.features.bins, profile.features.filters
-    about = Checkpoint("fusion", *sizes, profile.name, None, command(args), args.seed, members=members)
+    about = Checkpoint("fusion", *sizes, profile.name, None, command(args), args.seed)
 
     def write() -> str:
         sync()

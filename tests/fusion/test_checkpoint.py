@@ -5,7 +5,6 @@ import pytest
 from safetensors.numpy import save_file
 
 from fusion.checkpoint import Checkpoint, load_checkpoint, save_checkpoint
-from fusion.ensemble import EnsembleNet
 from fusion.expert_files import shipped_path
 from fusion.networks import CameraNet, FusionNet, LidarNet
 from hal.errors import StorageError
@@ -27,7 +26,6 @@ def checkpoint(kind="fusion", **changes) -> Checkpoint:
         (CameraNet(8, px=24, seed=1), checkpoint("camera", filters=8, px=24)),
         (LidarNet(101, seed=2), checkpoint("lidar", provenance='lira train-expert lidar "ä"')),
         (FusionNet(101, 16, seed=3), checkpoint()),
-        (EnsembleNet(FusionNet(101, 16, seed=3), 4, seed=5, committee=True), checkpoint(members=4)),
     ],
 )
 def test_what_is_saved_is_loaded(tmp_path, network, about):

@@ -4,8 +4,7 @@ from fusion.presets import METHODS
 
 LIRA = tuple(METHODS[name] for name in ("hold", "hold-scratch", "thesis", "plus"))
 HG_DAGGER = tuple(
-    METHODS[f"hg-dagger{kind}"]
-    for kind in ("", "-m10", "-trunks", "-warm", "-warm-m10", "-warm-m10-mirrored", "-warm-m10-committee")
+    METHODS[f"hg-dagger{kind}"] for kind in ("", "-m10", "-trunks", "-warm", "-warm-m10", "-warm-m10-mirrored")
 )
 FLOORS = tuple(METHODS[name] for name in ("cloning", "switching"))  # no interaction, no learning
 ALL = (*LIRA, *HG_DAGGER, *FLOORS)
