@@ -273,6 +273,8 @@ def test_some_methods_may_be_played_alone(capsys, tmp_path):
     assert "race has no method 'hg'" in capsys.readouterr().err
     assert chosen_methods(None, race, "race") == {"hold", "plus", "hg-dagger", "hg-dagger-warm-m10"}
     assert chosen_methods("all", race, "race") > {"thesis", "cloning", "switching"}
+    assert main(["experiment", "ablation", "--run", str(tmp_path), "--experts", "line@1"]) == 2
+    assert "ablation takes no --experts" in capsys.readouterr().err
     for name in ("tableC1", "all"):
         assert main(["experiment", name, *where]) == 2
         assert f"{name} takes no --methods" in capsys.readouterr().err

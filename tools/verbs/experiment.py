@@ -91,6 +91,8 @@ def play(args: argparse.Namespace, name: str) -> "tuple[Summary, Path]":
     chosen = chosen_methods(methods, experiment, name)
     trials = [trial for trial in experiment.trials(args.seeds) if not chosen or trial.method.name in chosen]
     if args.experts is not None:
+        if args.name != ALL and all(trial.experts for trial in trials):
+            raise ConfigError(f"{name} takes no --experts", "It is played with experts of its own choice.")
         trials = [msgspec.structs.replace(each, experts=each.experts or args.experts) for each in trials]
     for pair in dict.fromkeys(trial.pair for trial in trials):
         provide(pair)
