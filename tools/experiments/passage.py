@@ -113,8 +113,8 @@ def tables(outcomes: Outcomes) -> list[Table]:
     """What the novices took, and who comes by the wall where."""
     thesis: Row = {"method": "Table I", "n": 1, "passed": 1, "buffer": THESIS_LABELS, "training_steps": THESIS_STEPS}
     note = (
-        "The gap is 0.2 to 0.9 m left of straight ahead, open at the lidar's height; the way round is to the right. The "
-        "course that the lidar expert is trained on was made stricter after it had been seen here."
+        "The gap is 0.2 to 0.9 m left of straight ahead, open at the lidar's height; the way round is to the right. "
+        "The course that the lidar expert is trained on was made stricter after it had been seen here."
     )
     return [
         Table("Novices that learned to pass the wall", [*method_rows(outcomes, row), thesis]),
