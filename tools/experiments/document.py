@@ -70,8 +70,6 @@ def overview(summary: Summary) -> Row:
 def chapter(summary: Summary, causes: Mapping[str, str]) -> str:
     """Everything about one experiment."""
     parts = [f"\n## {summary.name}\n", f"{summary.words}. `{summary.command}`: {summary.trials} trials."]
-    if len(summary.fingerprints) > 1:
-        parts.append("Not all trials were played with the same code.")
     for each in summary.tables:
         parts += [f"\n{each.title}:\n", table(each.rows)]
         parts += [each.note] if each.note else []

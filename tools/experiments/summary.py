@@ -12,7 +12,7 @@ from tools.experiments.experiment import Experiment, Finding, Outcomes, Row, Tab
 class Summary(msgspec.Struct, frozen=True):
     """An experiment's numbers. `results` are the rows of its first table, `ratios` empty where nothing is paired.
 
-    `fingerprints` says with which code and experts the trials were played, one entry if they are all alike.
+    `fingerprints` says with which code and experts the trials were played: one for each pair of experts.
     """
 
     name: str
