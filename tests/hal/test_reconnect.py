@@ -104,7 +104,8 @@ def test_what_is_latched_stays_so_on_the_next_link():
     robot = Bus(name, listen=behind)
     with relayed(front, behind):
         client = Bus(name, connect=front)
-        client.publisher(BATTERY).put(BatteryState(1.0, 11.5), time_s=1.0)
+        battery = client.publisher(BATTERY)  # kept: what nobody holds any more is not declared again
+        battery.put(BatteryState(1.0, 11.5), time_s=1.0)
         wait_for(lambda: robot.peers() == 1)
     with relayed(front, behind):
         wait_for(lambda: client.links() == 2)
