@@ -2,9 +2,10 @@
 
 from fusion.presets import METHODS
 
-LIRA = tuple(METHODS[name] for name in ("hold", "hold-scratch", "thesis", "plus"))
+LIRA = tuple(METHODS[name] for name in ("hold", "hold-mirrored", "hold-scratch", "thesis", "plus"))
 HG_DAGGER = tuple(
-    METHODS[f"hg-dagger{kind}"] for kind in ("", "-m10", "-trunks", "-warm", "-warm-m10", "-warm-m10-mirrored")
+    METHODS[f"hg-dagger{kind}"]
+    for kind in ("", "-m10", "-mirrored", "-trunks", "-warm", "-warm-m10", "-warm-m10-mirrored")
 )
 FLOORS = tuple(METHODS[name] for name in ("cloning", "switching"))  # no interaction, no learning
 ALL = (*LIRA, *HG_DAGGER, *FLOORS)
