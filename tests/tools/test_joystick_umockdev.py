@@ -4,6 +4,7 @@ import itertools
 import json
 import os
 import signal
+import statistics
 import sys
 import time
 
@@ -162,8 +163,10 @@ def test_the_pad_is_found_by_its_controls_and_drives(rig):
     rig.bed.key(PAD, "BTN_TL", 0)
     rig.stands()
     rig.zeros_then_silence(released=True)
-    rate_hz = (len(stamps) - 1) / (stamps[-1] - stamps[0])
-    assert 20.0 < rate_hz < 45.0  # 30 Hz, on a machine that may stall
+    rate_hz = 1.0 / statistics.median(
+        after - before for before, after in itertools.pairwise(stamps)
+    )  # the machine may stall
+    assert 20.0 < rate_hz < 36.0
 
 
 def test_unplugged_it_stands_at_once_and_the_same_pad_takes_it_up_again(rig):
