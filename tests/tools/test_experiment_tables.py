@@ -10,7 +10,7 @@ from made_up_outcomes import HOLD, lap, outcome
 from fusion.ledger import Account
 from hal.errors import StorageError
 from tools.cli import main
-from tools.experiments import compare, densities, document, faults, sharing, thresholds, trajectories
+from tools.experiments import compare, densities, document, faults, methods, sharing, thresholds, trajectories
 from tools.experiments.experiment import Finding, Picture
 from tools.experiments.measures import driving_row, effort_row, label_row, source_rows
 from tools.experiments.page import write_page
@@ -121,7 +121,7 @@ def test_the_buffer_of_table_c1_has_to_fall_by_five():
 
 
 def race():
-    return [outcome(method.name, seed) for method in densities.METHODS for seed in range(2)]
+    return [outcome(method.name, seed) for method in methods.DRAWN for seed in range(2)]
 
 
 def test_labels_are_sorted_by_source_and_by_kind():

@@ -9,12 +9,10 @@ from hal.messages import Action
 from tools.experiments.compare import trials
 from tools.experiments.experiment import Experiment, Finding, Outcomes, Picture, Row, Table
 from tools.experiments.measures import by_method
-from tools.experiments.methods import HG_DAGGER, LIRA, USUAL
+from tools.experiments.methods import DRAWN, FUSED, HG_DAGGER
 from tools.experiments.trial import Outcome
 from tools.report.plots import BINS
 
-FUSED = tuple(method for method in USUAL if method in LIRA)
-METHODS = (*FUSED, HG_DAGGER[0])
 HUMAN = ("human", "demonstration")
 FULL = 0.9  # from here on an action is full speed, or full steer
 STRAIGHT = 0.1  # up to here it goes straight on; between the two lies the mid-range
@@ -137,14 +135,14 @@ def figures(outcomes: Outcomes) -> list[Picture]:
         for name in (each.name for each in FUSED)
     ]
     everyone = {
-        each.name: [action for labels in by_source(groups[each.name]).values() for action in labels] for each in METHODS
+        each.name: [action for labels in by_source(groups[each.name]).values() for action in labels] for each in DRAWN
     }
     return [*pictures, Picture("methods", "Labels by method (thesis, E.5)", partial(plots.densities, everyone, runs))]
 
 
 EXPERIMENTS = {
     "labels": Experiment(
-        trials=lambda seeds: [trial for trial in trials(seeds, "race") if trial.method in METHODS],
+        trials=lambda seeds: [trial for trial in trials(seeds, "race") if trial.method in DRAWN],
         tables=tables,
         findings=findings,
         figures=figures,

@@ -6,9 +6,9 @@ from functools import partial
 import numpy as np
 
 from tools.experiments.compare import trials
-from tools.experiments.densities import METHODS
 from tools.experiments.experiment import Experiment, Finding, Outcomes, Picture, Row, Table
 from tools.experiments.measures import by_method, known, method_rows, time_to_finish_s
+from tools.experiments.methods import DRAWN
 from tools.experiments.notes import Track
 from tools.experiments.trial import Outcome
 
@@ -69,7 +69,7 @@ def figures(outcomes: Outcomes) -> list[Picture]:
 
 EXPERIMENTS = {
     "trajectories": Experiment(
-        trials=lambda seeds: [trial for trial in trials(seeds, "race") if trial.method in METHODS],
+        trials=lambda seeds: [trial for trial in trials(seeds, "race") if trial.method in DRAWN],
         tables=tables,
         findings=findings,
         figures=figures,
