@@ -40,6 +40,8 @@ def open_session(
         "transport/unicast/max_links": 2,
         # Whoever has no keys for a robot that wants some hears it after this long.
         "transport/unicast/open_timeout": OPEN_MS,
+        # Whoever begins to connect and says no more holds up a close for this long.
+        "transport/unicast/accept_timeout": OPEN_MS,
         "transport/link/tx/lease": LEASE_MS,
         # It can lose a message when a receiver stalls.
         "transport/shared_memory/enabled": False,

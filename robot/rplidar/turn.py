@@ -121,7 +121,8 @@ def scan_of(turn: Turn, lidar: Lidar) -> LaserScan | None:
 def _slope(turn: Turn) -> float:
     """Seconds per radian of bearing, counter-clockwise."""
     span_s = float(turn.time_s[-1] - turn.time_s[0])
-    span_rad = float(turn.bearing_rad[-1] - turn.bearing_rad[0])
+    bearing_rad = np.unwrap(turn.bearing_rad)  # a point at the seam may lie on either side of it
+    span_rad = float(bearing_rad[-1] - bearing_rad[0])
     return span_s / span_rad if abs(span_rad) > math.pi else 0.0
 
 

@@ -1,6 +1,8 @@
 """The bus: what is put comes, the newest wins, garbage is counted, nobody and trouble are said."""
 
+import socket
 import threading
+import time
 
 import pytest
 import zenoh
@@ -137,6 +139,15 @@ def test_an_address_that_is_not_ours_is_one_clear_line():
         Bus("rosbot", listen="192.0.2.1:7447", insecure=True)
     assert "Cannot assign" in str(caught.value)
     assert ".rs" not in str(caught.value)
+
+
+def test_whoever_connects_and_says_nothing_does_not_hold_up_the_close():
+    endpoint = new_endpoint()
+    robot = Bus(new_name(), listen=endpoint)
+    host, port = endpoint.split(":")
+    with socket.create_connection((host, int(port))):
+        time.sleep(0.2)
+        assert robot.close()
 
 
 def test_a_closed_bus_says_so():

@@ -71,6 +71,12 @@ def test_each_beam_has_its_time():
     assert scan.stamp_s + beam * scan.time_increment == pytest.approx(turn.time_s[ahead], abs=0.001)
 
 
+def test_a_point_on_the_seam_does_not_confuse_the_times():
+    turn = cut(*spin(3.0, start_rad=math.pi))[0]
+    assert turn.bearing_rad[0] == -math.pi
+    assert scan_of(turn, LIDAR).time_increment == pytest.approx(-0.1 / LIDAR.beams, rel=0.02)
+
+
 def test_ranges_are_named_after_rep_117_and_the_nearest_counts():
     bearing = np.concatenate([np.linspace(math.pi, -math.pi, POINTS, endpoint=False), [0.5, 0.5, -0.5, 1.0, 1.5, 2.0]])
     distance = np.concatenate([np.full(POINTS, 3.0), [1.0, 2.0, 0.0, 0.05, 0.5, 0.0]])
