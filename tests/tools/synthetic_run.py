@@ -103,7 +103,13 @@ class Script:
 
 
 def write_run(
-    folder: Path, *, world: str = "line-obstacles", seed: int = 1, unseen: int = 3, ended: bool = True
+    folder: Path,
+    *,
+    world: str = "line-obstacles",
+    seed: int = 1,
+    unseen: int = 3,
+    ended: bool = True,
+    converged: bool = True,
 ) -> Path:
     """Write a whole run into `folder` and return the record's path."""
     path = folder / "run.jsonl"
@@ -121,7 +127,7 @@ def write_run(
         counts = script.counts
         script.writer.write(
             ResultRecord(
-                True, 2, counts["human"], counts["demonstration"], script.interventions, script.calls,
+                converged, 2, counts["human"], counts["demonstration"], script.interventions, script.calls,
                 sum(counts.values()), script.training_steps, script.time_s, script.time_s / 20,
             )
         )  # fmt: skip

@@ -40,9 +40,7 @@ def learner(folder, *, converged=True):
 import sys, pathlib
 sys.path.insert(0, {str(HERE)!r})
 from synthetic_run import write_run
-path = write_run(pathlib.Path({str(folder)!r}), unseen=1)
-if not {converged}:
-    path.write_bytes(path.read_bytes().replace(b'"converged":true', b'"converged":false'))
+write_run(pathlib.Path({str(folder)!r}), unseen=1, converged={converged})
 """
     return python(code)
 
