@@ -110,7 +110,7 @@ class Chooser(Protocol):
 
     @property
     def offers(self) -> Mapping[str, Policy]:
-        """Experts that the scripted teacher may name as its answer."""
+        """Who can be given the wheel."""
 
     def choose(self, name: str) -> str | None:
         """Give the expert of that name the wheel. Returns why not, None if it drives from now on."""

@@ -3,8 +3,7 @@
 - Pre-fill: before anybody teaches it, the novice learns what the first expert does while the others are quiet, and
   what active experts agree on.
 - Reservation: an expert's label counts only once a second has passed without the human correcting what the expert did.
-- A choice as an answer: instead of driving, the human may give the wheel to an expert for a while. A person may do so
-  at any time; `offered` makes it an answer of the scripted teacher, too.
+- A choice as an answer: instead of driving, the human may give the wheel to an expert for a while.
 - Memory: where the human has resolved an ambiguity that looked the same, the call is not made again.
 - At once: when the human lets go, what was shown is learned before the next m labels are there.
 - Confidence: where an ensemble of novices agrees as it hardly ever did when the human took over, the novice drives,
@@ -34,7 +33,6 @@ class PlusSettings(Table, frozen=True, tag="plus"):
     prefill: int = 60  # labels the experts give before the human is asked
     reserve_s: float = 1.0  # an expert's label waits so long for the human's objection
     wheel_s: float = 1.0  # an expert that was given the wheel keeps it so long
-    offered: bool = False  # whether the scripted teacher gives the wheel, too
     at_once: int = 3  # training steps whenever the human lets go
     recall: float | None = 0.9  # share of resolved ambiguities that the memory knows again (conformal)
     sure: float | None = 0.25  # in doubt less than in the calmest share of the moments of take-over, it is sure
@@ -71,12 +69,12 @@ class LiraPlus(LiraSpf):
 
     @property
     def offers(self) -> Mapping[str, Policy]:
-        """Who is offered to the scripted teacher instead of the wheel for itself."""
-        return {expert.name: expert.act for expert in self.experts} if self._plus.offered else {}
+        """Who can be given the wheel."""
+        return {expert.name: expert.act for expert in self.experts} if self._wheel_steps else {}
 
     def choose(self, name: str) -> str | None:
         """Give an expert the wheel for a while. Returns why not, None if it drives from now on."""
-        if not self._wheel_steps or all(name != expert.name for expert in self.experts):
+        if name not in self.offers:
             return f"there is no expert {name!r} to choose"
         self._wheel, self._left = name, self._wheel_steps
         self._gifts += 1

@@ -3,7 +3,7 @@
 What belongs to an approach is in its own settings; what could be combined with any of them is in `Method`.
 """
 
-from typing import Any, Literal
+from typing import Literal
 
 import msgspec
 
@@ -50,7 +50,7 @@ _M10 = LearningSettings(labels_per_step=10)
 _BOTH: tuple[Sensor, ...] = ("camera", "lidar")
 
 
-def _plus(name: str, *, learning: LearningSettings = _HEAVY, mirrored: bool = True, **changes: Any) -> Method:
+def _plus(name: str, *, learning: LearningSettings = _HEAVY, mirrored: bool = True, **changes: float | None) -> Method:
     """Return `plus` with changes to its settings."""
     return Method(name, msgspec.structs.replace(PlusSettings(), **changes), learning, mirrored=mirrored)
 
@@ -71,10 +71,10 @@ METHODS = {
         _plus("plus-no-reserve", reserve_s=0.0),
         _plus("plus-no-weight", learning=_M10),
         _plus("plus-no-mirror", mirrored=False),
+        _plus("plus-no-wheel", wheel_s=0.0),
         _plus("plus-no-memory", recall=None),
         _plus("plus-no-confidence", sure=None),
         _plus("plus-no-at-once", at_once=0),
-        _plus("plus-wheel", offered=True),
         _plus("plus-m30", learning=LearningSettings(human_weight=3.0)),
         Method("hg-dagger", _HG, trunks="scratch"),
         Method("hg-dagger-m10", _HG, _M10, trunks="scratch"),

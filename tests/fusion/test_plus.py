@@ -202,11 +202,7 @@ class TestWheel:
         scene = self.scene()
         assert isinstance(scene.method, Chooser)
         assert "no expert 'sonar'" in scene.method.choose("sonar")
-        assert "no expert 'lidar'" in Scene(BARE).method.choose("lidar")
-
-    def test_the_scripted_teacher_is_offered_it_where_that_is_set(self):
-        assert Scene(PlusSettings()).method.offers == {}
-        assert list(Scene(PlusSettings(offered=True)).method.offers) == ["camera", "lidar"]
+        assert Scene(BARE).method.offers == {}
 
     def test_each_time_has_its_number(self):
         scene = self.scene()

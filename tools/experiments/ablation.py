@@ -1,4 +1,4 @@
-"""What each part of `plus` is worth: changed one by one on line-obstacles, with experts no choice was made on."""
+"""What each part of `plus` is worth: left out one by one on line-obstacles, with experts no choice was made on."""
 
 from fusion.presets import METHODS
 from tools.experiments import pairs
@@ -8,14 +8,14 @@ from tools.experiments.pictures import box_pictures
 from tools.experiments.trial import Outcome, Trial
 
 WORLD = "line-obstacles"
-PAIRS = ("line@4", "line@5", "line@6")
+PAIRS = ("line@1", "line@2", "line@3")
 BASE = "plus"
 NAMES = tuple(name for name in METHODS if name.startswith(BASE))
 QUANTITIES = ("human_labels", "interventions")
 
 
 def trials(seeds: int) -> list[Trial]:
-    """The preset, and each of its changes, with every pair of experts on every seed."""
+    """The preset, and each of its parts left out, with every pair of experts on every seed."""
     return [
         Trial(METHODS[name], WORLD, seed, experts=pair) for name in NAMES for pair in PAIRS for seed in range(seeds)
     ]
@@ -28,15 +28,15 @@ def by_name(outcomes: Outcomes) -> dict[str, list[Outcome]]:
 
 
 def ratios(outcomes: Outcomes) -> list[Row]:
-    """Each change over the preset, pair by pair of one seed and one pair of experts."""
+    """Without a part over with all of them, pair by pair of one seed and one pair of experts."""
     return pairs.ratios(by_name(outcomes), [(BASE, name) for name in NAMES[1:]], (*QUANTITIES, "calls"))
 
 
 def tables(outcomes: Outcomes) -> list[Table]:
-    """The preset and its changes, and the ratios."""
+    """With and without each part, and the ratios."""
     return [
         Table("Labels and interventions", method_rows(outcomes, label_row)),
-        Table("Each change over the preset", ratios(outcomes), "Above 1 the preset as it is needs less."),
+        Table("Without a part over with all of them", ratios(outcomes), "Above 1 the part saves something."),
         Table("Calls and the human's time", method_rows(outcomes, effort_row)),
         Table("Driving", method_rows(outcomes, driving_row)),
     ]
