@@ -9,7 +9,7 @@ HG_DAGGER = tuple(
 )
 FLOORS = tuple(METHODS[name] for name in ("cloning", "switching"))  # no interaction, no learning
 ALL = (*LIRA, *HG_DAGGER, *FLOORS)
-# The thesis's two, what goes beyond them, and the rival that is fairest to it: played where no others are asked for.
+# The thesis's two, what goes beyond them, and HG-DAgger with the same experts: played where no others are asked for.
 USUAL = tuple(METHODS[name] for name in ("hold", "plus", "hg-dagger", "hg-dagger-warm-m10"))
 FUSED = tuple(method for method in USUAL if method in LIRA)
 DRAWN = (*FUSED, HG_DAGGER[0])  # those whose labels and drives are looked at
