@@ -64,6 +64,7 @@ class Core2:
         self._held_until_s = -math.inf
         self.baud: int | None = None
         self.counts = Counts()
+        self.losses = 0  # how often the board was silent, began anew, or was stopped by the guard; only grows
 
     @property
     def readings(self) -> Readings:
@@ -146,6 +147,7 @@ class Core2:
                 board.forget()
                 learning_s = now_s
             if not board.ready:
+                self.losses += self._answers
                 self._answers = False
                 if now_s - learning_s > LEARN_S:
                     raise DeviceError(f"the base board lacks {', '.join(board.missing) or 'config'}", FIRMWARE)
@@ -179,6 +181,7 @@ class Core2:
         """The board is ready: a guard beside it, its watchdog on, its motors as they shall be."""
         self._dismiss_guard()
         self._guard = Guard(line.fileno(), self._frame_of(STOP))
+        self.losses += self.counts.negotiations > 0
         self.counts.negotiations += 1
         self._board.configure("EWCH", "1")
         self._motors_told = None
@@ -194,6 +197,7 @@ class Core2:
         self._news.clear()
         assert self._guard is not None
         if self._guard.tell():
+            self.losses += 1
             self._held_until_s = now_s + HELD_S
         with self._lock:
             off, braked = self._motors_off, now_s >= self._power_until_s
