@@ -1,5 +1,6 @@
 """The CORE2 as its host sees it: what is learnt from its frames, and what it is to be told. No line, no clock."""
 
+import math
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -13,6 +14,10 @@ from robot.settings import BaseSettings
 
 # The board stamps with the time we gave it; what it says is believed if it is a plausible time before now.
 OLDEST_STAMP_S = 0.25
+CONFIG_MD5S = {
+    Id.SERVICE_REQUESTS: messages.CONFIG_REQUEST_MD5,
+    Id.SERVICE_ANSWERS: messages.CONFIG_ANSWER_MD5,
+}
 FIRMWARE = "Flash the ROSbot firmware 0.14.3 to 0.16.2."
 
 
@@ -28,11 +33,12 @@ class Readings:
 
 
 class Board:
-    """One session with the board. `handle` takes a frame and returns what has to be sent in answer."""
+    """One session with the board. `handle` takes its frames, `calls` gives what it has to be sent."""
 
     def __init__(self, settings: BaseSettings) -> None:
         self._reckoner = Reckoner(settings)
         self.readings = Readings()
+        self.read = self.announced = 0  # messages on topics that it announced, and announcements
         self.unreadable = 0  # messages that did not decode
         self.answers: list[str] = []  # of the service `config`
         self.log: list[str] = []
@@ -42,6 +48,8 @@ class Board:
     def forget(self) -> None:
         """The board starts anew: whatever it announced holds no more."""
         self._layouts: dict[int, tuple[str, str]] = {}
+        self._refused: dict[str, TopicInfo] = {}
+        self._asked_time_s: float | None = None
         self._velocity = (0.0, 0.0, 0.0)
         self.cmd_vel: int | None = None
         self._config: int | None = None
@@ -59,24 +67,37 @@ class Board:
     @property
     def ready(self) -> bool:
         """Whether it can be driven and configured."""
-        return not self.missing and self._config is not None
+        return not self.missing and self._config is not None and not self._refused
+
+    @property
+    def has_announced(self) -> bool:
+        """Whether it has told of anything since it was forgotten."""
+        return bool(self._layouts or self._refused) or self.cmd_vel is not None
+
+    def objection(self) -> DeviceError:
+        """Why it is not ready."""
+        if self._refused:
+            return wrong_layout(next(iter(self._refused.values())))
+        return DeviceError(f"the base board lacks {', '.join(self.missing) or 'config'}", FIRMWARE)
 
     def configure(self, command: str, data: str = "") -> None:
         """Have the board's service `config` called, until it answers; what it says comes into `answers`."""
         self._errands.want(command, data)
 
     def calls(self, now_s: float) -> bytes:
-        """Return what has to be sent now for `configure`; nothing before the board is `ready`."""
+        """Return what has to be sent now for `configure`, and the time if it asked; nothing before it is `ready`."""
         config = self._config
-        if config is None:
+        if config is None or not self.ready:
             return b""
-        return self._errands.due(now_s, lambda *texts: encode_frame(config, encode_strings(*texts)))
+        asked_s, self._asked_time_s = self._asked_time_s, None
+        time = b"" if asked_s is None else encode_time(asked_s)
+        return time + self._errands.due(now_s, lambda *texts: encode_frame(config, encode_strings(*texts)))
 
-    def handle(self, frame: Frame, now_s: float) -> bytes:
-        """Learn from a frame that came at `now_s`. Raises `DeviceError` for a board that speaks another language."""
+    def handle(self, frame: Frame, now_s: float) -> None:
+        """Learn from a frame that came at `now_s`. What cannot be read is counted."""
         if frame.topic == Id.TIME:
-            return encode_time(now_s)
-        if frame.topic in (Id.PUBLISHER, Id.SUBSCRIBER, Id.SERVICE_ANSWERS, Id.SERVICE_REQUESTS):
+            self._asked_time_s = now_s  # the board adds how long the answer was under way
+        elif frame.topic in (Id.PUBLISHER, Id.SUBSCRIBER, Id.SERVICE_ANSWERS, Id.SERVICE_REQUESTS):
             self._learn(Id(frame.topic), frame.payload)
         elif frame.topic == Id.LOG:
             self.log = [*self.log[-19:], frame.payload[5:].decode("utf-8", "replace")]
@@ -84,8 +105,8 @@ class Board:
             self.answers = [*self.answers[-19:], frame.payload[4:-1].decode("utf-8", "replace")]
             self._errands.answered()
         elif frame.topic in self._layouts:
+            self.read += 1
             self._read(*self._layouts[frame.topic], frame.payload, now_s)
-        return b""
 
     def _learn(self, way: Id, payload: bytes) -> None:
         try:
@@ -93,36 +114,58 @@ class Board:
         except ValueError:
             self.unreadable += 1
             return
-        if way is Id.SERVICE_REQUESTS and info.name == "config":
-            check_md5(info, messages.CONFIG_REQUEST_MD5)
-            self._config = info.topic
-        elif way is Id.SERVICE_ANSWERS and info.name == "config":
-            check_md5(info, messages.CONFIG_ANSWER_MD5)
-            self._config_answers = info.topic
+        self.announced += 1
+        if way in (Id.SERVICE_REQUESTS, Id.SERVICE_ANSWERS):
+            if info.name == "config" and self._accept(info, info.md5 == CONFIG_MD5S[way]):
+                if way is Id.SERVICE_REQUESTS:
+                    self._config = info.topic
+                else:
+                    self._config_answers = info.topic
         elif messages.is_known(info.name):
             layout = messages.layout_of(info.name, info.md5)
-            if layout is None:
-                raise wrong_layout(info)
+            if not self._accept(info, layout is not None) or layout is None:
+                return
             if way is Id.SUBSCRIBER and info.name == "cmd_vel":
                 self.cmd_vel = info.topic
             elif way is Id.PUBLISHER:
-                self._layouts[info.topic] = (info.name, layout)
+                others = {topic: told for topic, told in self._layouts.items() if told[0] != info.name}
+                self._layouts = {**others, info.topic: (info.name, layout)}
+
+    def _accept(self, info: TopicInfo, right: bool) -> bool:
+        """Note whether a topic's layout is ours; it may be told anew, rightly, if the line has spoilt it."""
+        if right:
+            self._refused.pop(info.name, None)
+        else:
+            self._refused[info.name] = info
+        return right
 
     def _read(self, topic: str, layout: str, payload: bytes, now_s: float) -> None:
         try:
-            message = messages.decode(layout, payload)
+            self._take(topic, messages.decode(layout, payload), now_s)
         except SensorError:
             self.unreadable += 1
-            return
+
+    def _take(self, topic: str, message: Any, now_s: float) -> None:
+        """Keep a reading. Raises `SensorError` for one that is not finite: it would never leave the odometry again."""
         readings = self.readings
         if topic == "velocity":
-            self._velocity = (message.linear.x, message.linear.y, message.angular.z)
+            velocity = (message.linear.x, message.linear.y, message.angular.z)
+            finite(*velocity)
+            self._velocity = velocity
         elif topic == "pose":
-            readings.odom = self._reckoner.step(messages.pose_of(message), self._velocity, stamp_of(message, now_s))
+            pose = messages.pose_of(message)
+            finite(pose.x_m, pose.y_m, pose.yaw_rad)
+            odom = self._reckoner.step(pose, self._velocity, stamp_of(message, now_s))
+            finite(odom.linear_m_s, odom.angular_rad_s)
+            readings.odom = odom
         elif topic == "imu":
-            readings.imu = messages.imu_of(message, stamp_of(message, now_s))
+            imu = messages.imu_of(message, stamp_of(message, now_s))
+            finite(imu.yaw_rad, imu.angular_rad_s, imu.linear_m_s2, imu.lateral_m_s2)
+            readings.imu = imu
         elif topic == "battery":
-            readings.battery = messages.battery_of(message, stamp_of(message, now_s))
+            battery = messages.battery_of(message, stamp_of(message, now_s))
+            finite(battery.voltage_v)
+            readings.battery = battery
         elif topic == "buttons":
             readings.buttons = message.data
         else:
@@ -130,16 +173,16 @@ class Board:
             readings.ranges[reading.frame_id] = reading
 
 
+def finite(*values: float) -> None:
+    """Raise `SensorError` if one of the values is not finite."""
+    if not all(map(math.isfinite, values)):
+        raise SensorError(f"the board measured {values}")
+
+
 def stamp_of(message: Any, now_s: float) -> float:
     """When a message was captured, on our clock: as it says, unless its clock is not ours yet."""
     stamp_s = float(message.header.stamp.sec + message.header.stamp.nanosec * 1e-9)
     return stamp_s if now_s - OLDEST_STAMP_S <= stamp_s <= now_s else now_s
-
-
-def check_md5(info: TopicInfo, md5: str) -> None:
-    """Raise `DeviceError` for a topic whose layout is not ours."""
-    if info.md5 != md5:
-        raise wrong_layout(info)
 
 
 def wrong_layout(info: TopicInfo) -> DeviceError:

@@ -11,6 +11,7 @@ from hal.errors import DeviceError
 from hal.messages import STOP, Twist
 from robot.core2 import messages
 from robot.core2.board import FIRMWARE, Board, Readings
+from robot.core2.contact import SILENCE_S, Contact, State
 from robot.core2.guard import Guard
 from robot.core2.rosserial import ASK_TOPICS, encode_frame, parse_frames
 from robot.line import Line
@@ -23,11 +24,13 @@ READ_S = 0.005
 FRAME_S = 1.0  # a board at this speed answers with a frame by then
 LEARN_S = 3.0
 ASK_S = 1.0
-SILENCE_S = 1.0  # then it may have been reset, and knows us no more
 LOST_S = 10.0
+# Commands go out no faster: what a board that resets does not read waits in its port (768 bytes), and there has to be
+# room for the zeros of its silence behind the commands that came before it.
+SPACE_S = 0.02
 POWER = "Check its power switch, and that the path is the base's."
 BRAKE_S = 0.3  # a wheel without power rolls on: the firmware's ramp brakes it before the power is cut
-HELD_S = 0.1  # after the guard has struck: time for the governor to see it, which then waits for a neutral command
+HELD_S = 0.1  # after a loss: time for the governor to see it, which then waits for a neutral command
 FAREWELL = 3  # zeros, in case one gets lost
 
 
@@ -61,7 +64,7 @@ class Core2:
         self._motors_told: bool | None = None
         self._answers = False
         self._guard: Guard | None = None
-        self._held_until_s = -math.inf
+        self._held_until_s = self._sent_s = -math.inf
         self.baud: int | None = None
         self.counts = Counts()
         self.losses = 0  # how often the board was silent, began anew, or was stopped by the guard; only grows
@@ -73,7 +76,7 @@ class Core2:
 
     @property
     def answers(self) -> bool:
-        """Whether the board is heard and can be driven now; false while it restarts, or just after its guard struck."""
+        """Whether the board is heard and can be driven now; false while it is silent or restarts, and just after."""
         return self._answers and time.monotonic() >= self._held_until_s
 
     def drive(self, twist: Twist, decided_s: float = math.inf) -> None:
@@ -131,60 +134,89 @@ class Core2:
         raise DeviceError(f"no base board answers at {self._url}", POWER)
 
     def _serve(self, line: Line, buffer: bytes, stop: threading.Event, begin: Callable[[], None]) -> None:
+        """Talk with the board.
+
+        A silent one gets zeros, then it is lost: from then on it is asked for its topics and told nothing else until
+        it has announced itself, and stands until there is a command of later than that.
+        """
         board = self._board
         board.forget()
-        heard_s = asked_s = learning_s = time.monotonic()
-        due_s = -math.inf
-        begun = False
+        self._sent_s = -math.inf
+        due_s = asked_s = learning_s = looped_s = time.monotonic()
+        contact, begun = Contact(due_s), False
         while not stop.is_set():
             now_s = time.monotonic()
-            buffer, heard = self._listen(line, buffer, now_s)
-            heard_s = now_s if heard else heard_s
-            if now_s - heard_s > LOST_S:
-                raise DeviceError(f"the base board at {self._url} fell silent", POWER)
-            if now_s - heard_s > SILENCE_S:
-                self._dismiss_guard()  # what it would write the board may have forgotten
-                board.forget()
-                learning_s = now_s
-            if not board.ready:
-                self.losses += self._answers
-                self._answers = False
-                if now_s - learning_s > LEARN_S:
-                    raise DeviceError(f"the base board lacks {', '.join(board.missing) or 'config'}", FIRMWARE)
-                if now_s - asked_s > ASK_S:
+            if now_s - looped_s > SILENCE_S:  # this thread stood still: what waits was said before, and proves nothing
+                line.flush_input()
+                buffer = b""
+            looped_s = now_s
+            before, (buffer, state) = contact.state, self._listen(line, buffer, contact, now_s)
+            if before is State.SPEAKING and state is not State.SPEAKING:
+                self._lose()
+                due_s = now_s
+            if state is State.LEARNING:
+                if before is not State.LEARNING:
+                    learning_s, asked_s = now_s, -math.inf
+                self._check_progress(now_s - learning_s)
+                if not board.ready and now_s - asked_s > ASK_S:
                     asked_s = now_s
                     line.write(ASK_TOPICS)
-            elif not self._answers:
-                self._begin(line)
-                due_s = now_s
+            elif state is State.SPEAKING and before is not State.SPEAKING:
+                self._begin(line, anew=before is State.LEARNING)
                 if not begun:
                     begin()
                 begun = True
-            elif now_s >= due_s or self._news.is_set():
-                self._tell(line, now_s)
+                due_s = looped_s = time.monotonic()
+            elif now_s >= due_s or (self._news.is_set() and now_s >= self._sent_s + SPACE_S):
+                self._tell(line, now_s, silent=state is State.SILENT)
                 due_s = now_s + SEND_S
                 if now_s < self._until_s:  # zero is sent when it is due, not with the next repetition
                     due_s = min(due_s, self._until_s)
             buffer += line.read(READ_S)
 
-    def _listen(self, line: Line, buffer: bytes, now_s: float) -> tuple[bytes, bool]:
-        """Let the board handle what came and send what it wants in return; returns the rest, and whether it spoke."""
+    def _listen(self, line: Line, buffer: bytes, contact: Contact, now_s: float) -> tuple[bytes, State]:
+        """Let the board handle what came and send what it wants in return; returns the rest, and how it is with it."""
+        board = self._board
         parsed = parse_frames(buffer)
         self.counts.lost_bytes += parsed.lost
         self.counts.frames += len(parsed.frames)
-        answer = b"".join(self._board.handle(frame, now_s) for frame in parsed.frames) + self._board.calls(now_s)
+        read, announced, before = board.read, board.announced, contact.state
+        for frame in parsed.frames:
+            board.handle(frame, now_s)
+        state = contact.step(now_s, read=board.read > read, announced=board.announced > announced, ready=board.ready)
+        if state is State.LEARNING and before is not State.LEARNING:
+            self._dismiss_guard()  # what it would write the board may have forgotten
+            if board.announced == announced:
+                board.forget()
+        answer = b"" if state is State.SILENT else board.calls(now_s)
         if answer:
             line.write(answer)
-        return buffer[parsed.consumed :], bool(parsed.frames)
+        return buffer[parsed.consumed :], state
 
-    def _begin(self, line: Line) -> None:
-        """The board is ready: a guard beside it, its watchdog on, its motors as they shall be."""
-        self._dismiss_guard()
-        self._guard = Guard(line.fileno(), self._frame_of(STOP))
-        self.losses += self.counts.negotiations > 0
-        self.counts.negotiations += 1
-        self._board.configure("EWCH", "1")
-        self._motors_told = None
+    def _lose(self) -> None:
+        """The board is silent, or begins anew: whatever was commanded before counts no more."""
+        self.losses += 1
+        self._answers = False
+        with self._lock:
+            self._until_s = -math.inf
+
+    def _check_progress(self, learning_for_s: float) -> None:
+        """Raise `DeviceError` for a board that does not announce what is needed."""
+        if learning_for_s > LOST_S:
+            raise DeviceError(f"the base board at {self._url} fell silent", POWER)
+        if learning_for_s > LEARN_S and self._board.has_announced and not self._board.ready:
+            raise self._board.objection()
+
+    def _begin(self, line: Line, *, anew: bool) -> None:
+        """The board is there: `anew` it gets a guard beside it, its watchdog on, and its motors as they shall be."""
+        if anew:
+            self._dismiss_guard()
+            self._guard = Guard(line.fileno(), self._frame_of(STOP))
+            self.counts.negotiations += 1
+            self._board.configure("EWCH", "1")
+            self._motors_told = None
+        if self.losses:
+            self._held_until_s = time.monotonic() + HELD_S
         self._answers = True
 
     def _dismiss_guard(self) -> None:
@@ -192,8 +224,8 @@ class Core2:
             self._guard.close()
             self._guard = None
 
-    def _tell(self, line: Line, now_s: float) -> None:
-        """Send what is wanted now."""
+    def _tell(self, line: Line, now_s: float, *, silent: bool) -> None:
+        """Send what is wanted now; zero to a board that is silent."""
         self._news.clear()
         assert self._guard is not None
         if self._guard.tell():
@@ -201,11 +233,12 @@ class Core2:
             self._held_until_s = now_s + HELD_S
         with self._lock:
             off, braked = self._motors_off, now_s >= self._power_until_s
-            held = off or now_s < self._held_until_s
+            held = silent or off or now_s < self._held_until_s
             twist = self._twist if now_s < self._until_s and not held else STOP
         line.write(self._frame_of(twist))
+        self._sent_s = now_s
         self.counts.commands += 1
-        if self._motors_told is not off and (braked or not off):
+        if not silent and self._motors_told is not off and (braked or not off):
             self._motors_told = off
             self._board.configure("EMOT", "0" if off else "1")
 

@@ -3,11 +3,14 @@
 import struct
 from dataclasses import dataclass
 from enum import IntEnum
+from string import hexdigits
 
 SYNC = b"\xff\xfe"
 HEAD_SIZE = 7
 # The board's buffers hold no more, and a longer frame from it is none.
 LARGEST_PAYLOAD = 512
+FIRST_TOPIC = 100  # ids below have a meaning of their own
+MD5_SIZE = 32
 
 
 class Id(IntEnum):
@@ -107,6 +110,8 @@ def parse_topic_info(payload: bytes) -> TopicInfo:
     except struct.error as error:
         raise ValueError(str(error)) from error
     name, kind, md5 = words
+    if topic < FIRST_TOPIC or len(md5) != MD5_SIZE or set(md5) - set(hexdigits) or not (name + kind).isprintable():
+        raise ValueError(f"'{name}' has the id {topic} and the MD5 '{md5}'")
     return TopicInfo(topic, name, kind, md5, buffer_size)
 
 

@@ -1,7 +1,8 @@
 """The guard's process, a script that needs the standard library alone: `watchman.py LINE EAR STOP_FRAME`.
 
 LINE and EAR are open descriptors, the frame is in hexadecimal. As long as bytes come on EAR it does nothing. If they
-stop it sends the frame until they come again, and says so; if EAR is closed it sends the frame and ends.
+stop, or EAR is closed, it sends the frame a few times, and says so; when EAR is closed it ends. It cannot hear what is
+on the line, which later may be a board that has begun anew: so it says no more until it has heard its driver again.
 """
 
 import contextlib
@@ -12,29 +13,28 @@ import time
 
 SILENCE_S = 0.2  # four commands of the driver
 AGAIN_S = 0.05
-ENOUGH_S = 2.0  # the firmware's watchdog has struck by then; what is on the line now may be another board
-FAREWELL = 3  # one may be lost behind half a frame of the driver's
+STRIKES = 6  # one may be lost behind half a frame of the driver's
+FAREWELL = 3
 STRUCK = b"!"
 READ_SIZE = 4096
 
 
 def watch(line: int, ear: int, stop_frame: bytes) -> None:
     """Watch until the ear is closed."""
-    heard_s = struck_s = time.monotonic()
-    struck = False
+    left, struck = STRIKES, False
     while True:
-        ready, _, _ = select.select([ear], [], [], AGAIN_S if struck else SILENCE_S)
-        now_s = time.monotonic()
+        ready, _, _ = select.select([ear], [], [], (AGAIN_S if left else None) if struck else SILENCE_S)
         if ready:
             if not hear(ear):
                 break
-            heard_s, struck = now_s, False
-        elif not struck and now_s - heard_s >= SILENCE_S:
-            struck, struck_s = True, now_s
+            left, struck = STRIKES, False
+            continue
+        if not struck:
+            struck = True
             send(ear, STRUCK)
-        if struck and now_s - struck_s < ENOUGH_S:
-            send(line, stop_frame)
-    for _ in range(FAREWELL):
+        send(line, stop_frame)
+        left -= 1
+    for _ in range(min(left, FAREWELL)):
         send(line, stop_frame)
         time.sleep(AGAIN_S / 5)
 

@@ -1,4 +1,7 @@
-"""A CORE2 board with ROSbot firmware as its line sees it: bytes in, bytes out, time handed in."""
+"""A CORE2 board with ROSbot firmware as its line sees it: bytes in, bytes out, time handed in.
+
+Source: the firmware's `main.cpp` and `config_functionality.cpp`, and its rosserial library.
+"""
 
 import math
 import random
@@ -7,11 +10,11 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from hal.messages import STOP, Odometry, Twist
+from sim_backend.emulators.rosserial import Reader, encode, header, log, pack_string, topic_info, unpack_string
 
 BOOT_S = 2.0
 BOOT_TEXT = b"\x00\xffrosbot firmware 0.16.2\r\n" + bytes(range(0x80, 0xFF))
-BUFFER_SIZE = 512
-FRAME_S = 0.02  # a frame has to arrive within
+RING_SIZE = 768  # what comes while nobody reads waits in the serial port; what exceeds it is lost
 WATCHDOG_S = 1.0
 DRIVE_S = 0.1  # a target is repeated to the wheels, which may have a watchdog of their own
 ASK_TIME_S = 2.5
@@ -19,8 +22,14 @@ GIVE_UP_S = 11.0  # without an answer to the question for the time
 POSE_S, SLOW_S, BATTERY_S = 0.05, 0.1, 0.4
 VOLTAGE_V = 11.7
 GRAVITY_M_S2 = 9.81
+WHEEL_RADIUS_M = 0.0425
+WHEELS = tuple(f"{place}_wheel_hinge" for place in ("front_left", "front_right", "rear_left", "rear_right"))
+BANNER = "rosbot firmware 0.16.2".ljust(386, "*")  # 391 bytes with its level and length
+INFO, ERROR = 1, 3
 
-FIRST_ID = 100
+# Ids count from here in the order in which the firmware makes its subscribers and publishers: `config` comes first.
+FIRST_SUBSCRIBED, FIRST_PUBLISHED = 100, 125
+CONFIG = ("rosbot_ekf/Configuration", "b116973260063b7b02b501a288810d3d", "d26ad64e1f52355ee24245b602a171ba")
 PUBLISHED = {
     "battery": ("sensor_msgs/BatteryState", "4ddae7f048e32fda22cac764685e3974"),
     "pose": ("geometry_msgs/PoseStamped", "d3812c3cbc69362b77dc0b19b345f8f5"),
@@ -29,15 +38,24 @@ PUBLISHED = {
     "range/fl": ("sensor_msgs/Range", "c005c34273dc426c67a020a87bc24148"),
     "range/rr": ("sensor_msgs/Range", "c005c34273dc426c67a020a87bc24148"),
     "range/rl": ("sensor_msgs/Range", "c005c34273dc426c67a020a87bc24148"),
+    "joint_states": ("sensor_msgs/JointState", "3066dcd76a6cfaef579bd0f34173e9fd"),
     "imu": ("sensor_msgs/Imu", "6a62c6daae103f4ff57a132d6f95cec2"),
     "buttons": ("std_msgs/UInt8", "7c8164229e7d2c17eb95e9231617fdee"),
 }
 SUBSCRIBED = {
-    "cmd_ser": ("std_msgs/UInt32", "304a39449588c7f8ce2df6e8001c5fce"),
     "cmd_vel": ("geometry_msgs/Twist", "9f195f881246fdfa2798d1d3eebca84a"),
+    "cmd_ser": ("std_msgs/UInt32", "304a39449588c7f8ce2df6e8001c5fce"),
 }
-CONFIG = ("rosbot_ekf/Configuration", "b116973260063b7b02b501a288810d3d", "d26ad64e1f52355ee24245b602a171ba")
-OK, UNKNOWN = 0, 2
+PERIODS_S = dict.fromkeys(PUBLISHED, SLOW_S) | dict.fromkeys(("pose", "velocity", "joint_states"), POSE_S)
+PERIODS_S["battery"] = BATTERY_S
+del PERIODS_S["buttons"]  # only when pressed
+
+OK, FAILURE, UNKNOWN = 0, 1, 2
+# What the words of `config` need as their data, for it to be accepted; what is not here the firmware has no word for.
+NUMBERS = {"EWCH": 1, "EMOT": 0, "EJSM": 1, "EIMU": 1, "ETFM": 1, "SLED": 2, "CALI": 2, "CPID": 0, "CSER": 0}
+NUMBERS |= {"RODOM": 0, "SANI": 0, "GPID": 0, "SKIN": 0, "GKIN": 0}
+REFUSED = ("RIMU", "EDSE")  # known, and not implemented
+PID = "kp:0.800 ki:0.200 kd:0.015 out_max:0.800 out_min:-0.800 a_max:1.500e+00 speed_max: 1.000"
 
 Drive = Callable[[Twist], None]
 Measure = Callable[[], Odometry]
@@ -66,39 +84,46 @@ class Core2Unit:
         self.baud = self.firmware.baud
         self._random = random.Random(seed)
         self.crashed = False
-        self.published = {name: FIRST_ID + 25 + i for i, name in enumerate(PUBLISHED)}
-        self.subscribed = {name: FIRST_ID + i for i, name in enumerate(SUBSCRIBED)}
-        self.config_id = FIRST_ID + len(SUBSCRIBED)
-        self._started_s: float | None = None
+        self.config_request_id, self.config_answer_id = FIRST_SUBSCRIBED, FIRST_PUBLISHED
+        self.subscribed = {name: FIRST_SUBSCRIBED + 1 + i for i, name in enumerate(SUBSCRIBED)}
+        self.published = {name: FIRST_PUBLISHED + 1 + i for i, name in enumerate(PUBLISHED)}
         self.reset()
 
-    def reset(self) -> None:
-        """Press the board's reset button: it stops, forgets its host, and boots."""
-        self._started_s = None
-        self._input = b""
-        self._input_s = 0.0
+    def reset(self, boot_s: float | None = None) -> None:
+        """Press the board's reset button, also in mid drive: it stops, forgets its host, and boots for `boot_s`.
+
+        What comes meanwhile waits in the serial port, and is obeyed once it has booted: ids belong to no session.
+        """
+        self._boot_s = self.firmware.boot_s if boot_s is None else boot_s
+        self._started_s: float | None = None
+        self._booted = False
+        self._ring = b""
+        self._reader = Reader()
         self._output = b""
         self.configured = False
-        self.watchdog = False
-        self.motors = True
+        self.watchdog = self.motors = True
+        self.joint_states = False
+        self.kinematics = "DIFF"
         self.target = STOP
+        self.obeyed_unannounced = 0  # commands that came when it ran again and had announced nothing
         self._commanded_s = -math.inf
         self._driven, self._drive_again_s = STOP, -math.inf
         self._clock_s: float | None = None  # the host's time less ours
         self._asked_s = self._answered_s = -math.inf
-        self._due_s = dict.fromkeys(PUBLISHED, -math.inf)
+        self._due_s = dict.fromkeys(PERIODS_S, -math.inf)
 
     def receive(self, data: bytes, now_s: float) -> None:
-        """Take bytes; what exceeds the buffer is lost, and so is a frame that comes too slowly."""
-        if self._booting(now_s) or self.crashed:
+        """Take bytes. A frame that comes too slowly is lost."""
+        if self.crashed:
             return
-        if self._input and now_s - self._input_s > FRAME_S:
-            self._input = b""
-        self._input_s = now_s
-        self._input += data
-        while (frame := self._take_frame()) is not None:
-            self._obey(*frame, now_s)
-        self._input = self._input[-BUFFER_SIZE:]
+        if self._booting(now_s):
+            self._ring = (self._ring + data)[:RING_SIZE]
+            return
+        for topic, payload in self._reader.read(data, now_s):
+            if not self.configured and topic == self.subscribed["cmd_vel"]:
+                self.obeyed_unannounced += 1
+            self._obey(topic, payload, now_s)
+        self.crashed |= self._reader.overrun
 
     def emit(self, now_s: float) -> bytes:
         """Return what is due, and let the watchdog strike."""
@@ -119,31 +144,24 @@ class Core2Unit:
         output, self._output = self._output, b""
         return output
 
+    def press(self, button: int) -> None:
+        """Press button 1 or 2."""
+        if self.configured:
+            self._send(self.published["buttons"], bytes([button]))
+
     def _booting(self, now_s: float) -> bool:
+        """Whether it still boots; once it has, it obeys at once all that has come meanwhile."""
         if self._started_s is None:
             self._started_s = now_s
             self._drive(STOP)
-        return now_s - self._started_s < self.firmware.boot_s
-
-    def _take_frame(self) -> tuple[int, bytes] | None:
-        """Take the next whole frame off the input, as the firmware's state machine does."""
-        while True:
-            start = self._input.find(b"\xff\xfe")
-            if start < 0:
-                self._input = self._input[-1:]
-                return None
-            self._input = self._input[start:]
-            if len(self._input) < 8:
-                return None
-            size = struct.unpack_from("<H", self._input, 2)[0]
-            sound = (sum(self._input[2:4]) + self._input[4]) % 256 == 255 and size <= BUFFER_SIZE
-            if sound and len(self._input) < size + 8:
-                return None
-            if sound and sum(self._input[5 : size + 8]) % 256 == 255:
-                topic = struct.unpack_from("<H", self._input, 5)[0]
-                payload, self._input = self._input[7 : size + 7], self._input[size + 8 :]
-                return topic, payload
-            self._input = self._input[2:]
+        if now_s - self._started_s < self._boot_s:
+            return True
+        if not self._booted:
+            self._booted = True
+            self._log(ERROR, "VL53L0X sensros initialisation failure!")  # also before anybody has asked for topics
+            for frame in self._reader.read(self._ring, now_s):
+                self._obey(*frame, now_s)
+        return False
 
     def _obey(self, topic: int, payload: bytes, now_s: float) -> None:
         if topic == 0:
@@ -159,32 +177,45 @@ class Core2Unit:
         elif topic == self.subscribed["cmd_vel"]:
             linear, angular = struct.unpack_from("<d", payload)[0], struct.unpack_from("<d", payload, 40)[0]
             self.target, self._commanded_s = Twist(linear, angular), now_s
-        elif topic == self.config_id:
-            self._configure(payload)
+        elif topic == self.config_request_id:
+            word, rest = unpack_string(payload)
+            result, answer = self._configure(word, unpack_string(rest)[0])
+            if self.configured:
+                self._send(self.config_answer_id, pack_string(answer) + bytes([result]))
         elif topic not in self.subscribed.values():
             self.crashed = True
 
-    def _configure(self, payload: bytes) -> None:
-        command, rest = unpack_string(payload)
-        data, _ = unpack_string(rest)
-        result = OK
-        if command == "EWCH":
-            self.watchdog = data == "1"
-        elif command == "EMOT":
-            self.motors = data == "1"
-        elif command not in ("EJSM", "EIMU", "CALI", "CPID", "SKIN"):
-            result = UNKNOWN
-        self._send(self.config_id, pack_string("") + bytes([result]))
+    def _configure(self, word: str, data: str) -> tuple[int, str]:
+        """Result and data of a call."""
+        if word in REFUSED:
+            return FAILURE, ""
+        if word not in NUMBERS:
+            return UNKNOWN, ""
+        numbers = data.split()
+        if len(numbers) < NUMBERS[word] or (word == "SKIN" and data not in ("DIFF", "MEC")):
+            return FAILURE, ""
+        if word == "EWCH":
+            self.watchdog = numbers[0] != "0"
+        elif word == "EMOT":
+            self.motors = numbers[:1] not in ([], ["0"])
+            self.target = STOP  # the regulators begin anew: it stands until the next command
+            self._log(INFO, "Motors connected." if self.motors else "Motors disconnected.")
+        elif word == "EJSM":
+            self.joint_states = numbers[0] != "0"
+        elif word == "SKIN":
+            self.kinematics = data
+        return OK, {"GKIN": self.kinematics, "GPID": PID}.get(word, "")
 
     def _announce(self) -> None:
         changed = dict(self.firmware.md5s)
-        for name, (kind, md5) in PUBLISHED.items():
-            self._send(0, topic_info(self.published[name], name, kind, changed.get(name, md5)))
         kind, request_md5, answer_md5 = CONFIG
-        self._send(2, topic_info(self.config_id, "config", kind, answer_md5))
-        self._send(3, topic_info(self.config_id, "config", kind, request_md5))
-        for name, (kind, md5) in SUBSCRIBED.items():
-            self._send(1, topic_info(self.subscribed[name], name, kind, changed.get(name, md5)))
+        self._send(2, topic_info(self.config_answer_id, "config", kind, answer_md5))
+        for name, (published, md5) in PUBLISHED.items():
+            self._send(0, topic_info(self.published[name], name, published, changed.get(name, md5)))
+        self._send(3, topic_info(self.config_request_id, "config", kind, request_md5))
+        for name, (subscribed, md5) in SUBSCRIBED.items():
+            self._send(1, topic_info(self.subscribed[name], name, subscribed, changed.get(name, md5)))
+        self._log(INFO, BANNER)
 
     def _keep_in_touch(self, now_s: float) -> None:
         if now_s - self._answered_s > GIVE_UP_S:
@@ -198,9 +229,8 @@ class Core2Unit:
 
     def _publish(self, now_s: float) -> None:
         odom = self._measure()
-        for name in PUBLISHED:
-            period_s = POSE_S if name in ("pose", "velocity") else BATTERY_S if name == "battery" else SLOW_S
-            if now_s >= self._due_s[name]:
+        for name, period_s in PERIODS_S.items():
+            if now_s >= self._due_s[name] and (name != "joint_states" or self.joint_states):
                 self._due_s[name] = max(self._due_s[name] + period_s, now_s + period_s / 2)
                 self._send(self.published[name], self._payload(name, odom, now_s))
 
@@ -220,35 +250,15 @@ class Core2Unit:
         if name == "battery":
             unknown = struct.pack("<6f", *[math.nan] * 6)
             return header(stamp_s, "") + struct.pack("<f", VOLTAGE_V) + unknown + b"\0\0\2\1" + bytes(16)
-        if name == "buttons":
-            return b"\0"
+        if name == "joint_states":
+            turned = struct.pack("<I4d", len(WHEELS), *[odom.x_m / WHEEL_RADIUS_M] * len(WHEELS))
+            names = struct.pack("<I", len(WHEELS)) + b"".join(map(pack_string, WHEELS))
+            return header(stamp_s, "base_link") + names + turned + bytes(8)
         frame = name.replace("/", "_")
         return header(stamp_s, frame) + struct.pack("<B4f", 1, 0.26, 0.03, 0.90, -1.0)
 
+    def _log(self, level: int, text: str) -> None:
+        self._send(7, log(level, text))
+
     def _send(self, topic: int, payload: bytes) -> None:
-        size, body = struct.pack("<H", len(payload)), struct.pack("<H", topic) + payload
-        checks = [255 - sum(part) % 256 for part in (size, body)]
-        self._output += b"\xff\xfe" + size + bytes(checks[:1]) + body + bytes(checks[1:])
-
-
-def header(stamp_s: float, frame: str) -> bytes:
-    """std_msgs/Header of ROS 1."""
-    nanoseconds = int(max(stamp_s, 0.0) * 1e9)
-    return struct.pack("<III", 0, nanoseconds // 10**9, nanoseconds % 10**9) + pack_string(frame)
-
-
-def topic_info(number: int, name: str, kind: str, md5: str) -> bytes:
-    """rosserial_msgs/TopicInfo."""
-    texts = b"".join(pack_string(text) for text in (name, kind, md5))
-    return struct.pack("<H", number) + texts + struct.pack("<i", BUFFER_SIZE)
-
-
-def pack_string(text: str) -> bytes:
-    """Length and bytes."""
-    return struct.pack("<I", len(text)) + text.encode("ascii")
-
-
-def unpack_string(data: bytes) -> tuple[str, bytes]:
-    """Return the text and what follows it."""
-    size = struct.unpack_from("<I", data)[0]
-    return data[4 : 4 + size].decode("ascii"), data[4 + size :]
+        self._output += encode(topic, payload)

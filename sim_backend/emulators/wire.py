@@ -38,7 +38,8 @@ class Unit(Protocol):
 class Wire:
     """Runs a unit behind the link `path` in a thread of its own, from construction until `close`.
 
-    A host at another speed gets and gives garbage. Set `loss` to lose that share of the bytes to the host.
+    A host at another speed gets and gives garbage. Set `loss` to lose that share of the bytes to the host; `mute` to
+    cut the way to the host, and `deaf` the way from it.
     """
 
     def __init__(self, path: Path, unit: Unit, seed: int = 0) -> None:
@@ -50,6 +51,7 @@ class Wire:
         self._ends: tuple[int, int] | None = None
         self._noise = b""
         self.loss = 0.0
+        self.mute = self.deaf = False
         self.overflowed = 0  # bytes that the host did not fetch in time
         self.plug()
         self._thread = threading.Thread(target=self._run, name=f"wire-{path.name}", daemon=True)
@@ -108,11 +110,13 @@ class Wire:
         same_speed = speed(slave) == self._unit.baud
         if select.select([master], [], [], 0.0)[0]:
             data = os.read(master, READ_SIZE)
-            if same_speed:
+            if same_speed and not self.deaf:
                 self._unit.receive(data, now_s)
         data = self._unit.emit(now_s)
         if not same_speed:
             data = self._random.randbytes(len(data) // 2)
+        if self.mute:
+            data = b""
         if self.loss:
             data = bytes(byte for byte in data if self._random.random() >= self.loss)
         data, self._noise = data + self._noise, b""

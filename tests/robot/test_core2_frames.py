@@ -1,4 +1,5 @@
 import math
+import re
 import struct
 from itertools import pairwise
 
@@ -6,7 +7,6 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from hal.errors import DeviceError
 from hal.messages import Twist
 from robot.core2 import messages
 from robot.core2.board import Board
@@ -23,7 +23,7 @@ from robot.core2.rosserial import (
 )
 from robot.core2.wheels import Pose, Reckoner
 from robot.settings import BaseSettings
-from sim_backend.emulators import core2 as emulator
+from sim_backend.emulators import rosserial as emulator
 
 FRAMES = [Frame(topic, bytes([topic % 256] * size)) for topic, size in [(100, 0), (125, 48), (10, 8), (127, 320)] * 5]
 STREAM = b"".join(encode_frame(frame.topic, frame.payload) for frame in FRAMES)
@@ -117,15 +117,36 @@ def announce(board, topic, name, md5, way=Id.PUBLISHER):
 
 
 def test_another_layout_is_refused_with_the_remedy():
-    with pytest.raises(DeviceError, match=r"pose.*unknown layout.*Flash"):
-        announce(Board(BaseSettings()), 125, "pose", "0" * 32)
+    board = Board(BaseSettings())
+    announce(board, 125, "pose", "0" * 32)
+    assert re.search(r"pose.*unknown layout.*Flash", str(board.objection()))
+    announce(board, 125, "pose", "d3812c3cbc69362b77dc0b19b345f8f5")  # the line had spoilt it
+    assert "lacks" in str(board.objection())
+
+
+def test_an_announcement_that_cannot_be_is_counted():
+    board = Board(BaseSettings())
+    announce(board, 99, "cmd_vel", "9f195f881246fdfa2798d1d3eebca84a", Id.SUBSCRIBER)  # would be a request for topics
+    announce(board, 101, "cmd_vel", "9f195f88", Id.SUBSCRIBER)
+    assert board.cmd_vel is None
+    assert (board.unreadable, board.announced) == (2, 0)
+
+
+def test_a_reading_that_is_not_finite_is_counted_and_does_not_stay_in_the_odometry():
+    board = Board(BaseSettings())
+    announce(board, 125, "pose", "d3812c3cbc69362b77dc0b19b345f8f5")
+    for x in (1.0, math.nan, 1.1):
+        board.handle(Frame(125, emulator.header(0.0, "odom") + struct.pack("<7d", x, 0, 0, 0, 0, 0, 1)), 0.0)
+    assert board.unreadable == 1
+    assert board.readings.odom.x_m == pytest.approx(0.1)
 
 
 def test_topics_of_no_matter_may_have_any_layout():
     board = Board(BaseSettings())
     announce(board, 140, "joint_states", "0" * 32)
     announce(board, 141, "velocity_of_light", "0" * 32)
-    assert board.handle(Frame(140, b"abc"), 0.0) == b""
+    board.handle(Frame(140, b"abc"), 0.0)
+    assert (board.read, board.unreadable) == (0, 0)
 
 
 def test_nothing_is_sent_to_what_was_not_announced():
