@@ -6,3 +6,4 @@ def no_long_waits(monkeypatch):
     """Devices are tried again, and resets waited for, without the patience that real ones need."""
     monkeypatch.setattr("robot.keeper.RETRY_S", 0.2)
     monkeypatch.setattr("robot.rplidar.device.RESET_S", 0.2)
+    monkeypatch.setattr("robot.rosbot.OPEN_S", 6.0)

@@ -36,7 +36,7 @@ class Bench:
 
     def __enter__(self):
         self.keeper.start()
-        self.keeper.wait_alive(8.0)
+        self.keeper.wait_alive(5.0)
         return self
 
     def __exit__(self, *_):
