@@ -1,8 +1,11 @@
 """The RPLIDAR on its line: bring it up, read its turns, and stop it for certain."""
 
 import contextlib
+import math
+import statistics
 import threading
 import time
+from collections import deque
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
@@ -26,6 +29,8 @@ SILENCE_S = 0.5  # a scanning unit that sends nothing for so long is lost
 READ_S = 0.1
 CONF_FIRMWARE = (1, 24)
 STANDARD_SAMPLES_S = (500e-6, 250e-6)  # of a standard and an express scan, if the unit does not tell
+SAMPLE_S = (20e-6, 2e-3)  # a sample that takes less or more was not understood
+SPANS = 15  # so many capsules tell how far one spans
 POWER = "Check its cable and power, and that the path is the lidar's."
 
 
@@ -116,11 +121,14 @@ class Stream:
         self._counts = counts
         self._buffer = b""
         self._newest_s = -np.inf
+        self._spans_deg: deque[float] = deque(maxlen=SPANS)
 
     def feed(self, data: bytes, now_s: float) -> list[LaserScan]:
         """Take what came by `now_s`, and return the scans that it completes."""
         self._buffer += data
-        points = self._parse(self._buffer)
+        usual_deg = statistics.median(self._spans_deg) if len(self._spans_deg) > SPANS // 3 else math.inf
+        points = self._parse(self._buffer, usual_deg)
+        self._spans_deg.extend(points.span_deg.tolist())
         self._buffer = self._buffer[points.consumed :]
         self._counts.lost_bytes += points.lost
         self._counts.points += len(points)
@@ -196,7 +204,9 @@ class Unit:
     def _modes(self, info: Info) -> list[Mode]:
         """Modes to try, best first. Old firmware does not tell; the oldest knows nothing but the standard scan."""
         rates = self._ask(protocol.encode_request(Request.SAMPLE_RATE), Answer.SAMPLE_RATE, 4)
-        standard_s, express_s = STANDARD_SAMPLES_S if rates is None else protocol.parse_sample_rate(rates)
+        told = STANDARD_SAMPLES_S if rates is None else protocol.parse_sample_rate(rates)
+        standard_s = told[0] if is_plausible(told[0]) else STANDARD_SAMPLES_S[0]
+        express_s = told[1] if is_plausible(told[1]) else 0.0  # none
         offered = self._offered() if info.firmware >= CONF_FIRMWARE else []
         modes = [mode for answer in PARSERS for mode in offered if mode.answer is answer]
         if not modes and express_s > 0.0:
@@ -208,7 +218,7 @@ class Unit:
         modes = []
         for number in range(min(self._conf(Conf.MODE_COUNT) or 0, 16)):
             answer, sample_us_q8 = self._conf(Conf.ANSWER_TYPE, number), self._conf(Conf.US_PER_SAMPLE, number)
-            if answer in set(PARSERS) and sample_us_q8:
+            if answer in set(PARSERS) and sample_us_q8 is not None and is_plausible(sample_us_q8 / 256e6):
                 kind = Answer(answer)
                 standard = kind is Answer.STANDARD
                 request = protocol.encode_request(Request.SCAN) if standard else protocol.encode_express(number)
@@ -247,6 +257,11 @@ class Unit:
         while (left_s := until_s - time.monotonic()) > 0.0:
             heard |= bool(self._line.read(left_s))
         return heard
+
+
+def is_plausible(sample_s: float) -> bool:
+    """Whether a unit may take so long for a sample."""
+    return SAMPLE_S[0] <= sample_s <= SAMPLE_S[1]
 
 
 def halt(line: Line) -> None:

@@ -6,8 +6,10 @@ its successor: a capsule's points lie between its angle and the next one's, and 
 a plausible neighbour.
 """
 
+import math
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,8 +30,13 @@ SURE_NODES = 3
 # The angle may jitter back a little, and goes on by no more than this between two nodes (15 Hz at 2000 samples/s: 2.7).
 BACK_DEG = 2.0
 AHEAD_DEG = 10.0
-# No capsule spans more: 15 Hz at 4000 samples/s is 43 degrees. Two capsules with one lost between them do.
-CAPSULE_DEG = 50.0
+# A capsule that spans so many times what capsules have spanned of late, and a bit, has lost its successor.
+STRETCH, SLACK_DEG = 1.5, 0.5
+# What a point spans at most: a head at 20 Hz, 508 us a sample.
+POINT_DEG = 360.0 * 20.0 * 508e-6
+
+
+NOTHING: Floats = np.empty(0)
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,6 +44,7 @@ class Points:
     """A piece of a stream. `theta_rad`: clockwise from the unit's front, [0, 2 pi); `distance_m`: 0 is invalid.
 
     `consumed` bytes are done with, `lost` of them made no sense. `waiting` points have come that are not among these.
+    `span_deg`: from each capsule to the next one, also of those that were refused.
     """
 
     theta_rad: Floats
@@ -44,16 +52,20 @@ class Points:
     consumed: int = 0
     lost: int = 0
     waiting: int = 0
+    span_deg: Floats = field(default_factory=lambda: NOTHING)
 
     def __len__(self) -> int:
         return len(self.theta_rad)
 
 
-Parser = Callable[[bytes], Points]
-NOTHING = np.empty(0)
+class Parser(Protocol):
+    """Reads one answer type. `usual_deg` is what capsules have spanned of late, if that is known."""
+
+    def __call__(self, buffer: bytes, usual_deg: float = math.inf) -> Points:
+        """Return the points at the start of the buffer."""
 
 
-def parse_standard(buffer: bytes) -> Points:
+def parse_standard(buffer: bytes, usual_deg: float = math.inf) -> Points:  # noqa: ARG001 - a node has its own angle
     """Read nodes of 5 bytes: quality, S and its inverse; check bit, angle / 64 deg; distance / 4 mm."""
     data = np.frombuffer(buffer, np.uint8)
     pieces: list[tuple[Floats, Floats]] = []
@@ -123,14 +135,14 @@ def _believable(theta_deg: Floats) -> NDArray[np.bool_]:
     return believed
 
 
-def parse_express(buffer: bytes) -> Points:
+def parse_express(buffer: bytes, usual_deg: float = math.inf) -> Points:
     """Read capsules of 16 cabins: two distances / 4 mm with 2 bits of an angle's correction, and the rest of both."""
-    return _parse_capsules(buffer, EXPRESS_POINTS, _express_points)
+    return _parse_capsules(buffer, usual_deg, EXPRESS_POINTS, _express_points)
 
 
-def parse_dense(buffer: bytes) -> Points:
+def parse_dense(buffer: bytes, usual_deg: float = math.inf) -> Points:
     """Read capsules of 40 distances in mm, evenly spread between two start angles."""
-    return _parse_capsules(buffer, DENSE_POINTS, _dense_points)
+    return _parse_capsules(buffer, usual_deg, DENSE_POINTS, _dense_points)
 
 
 def _express_points(bodies: Bytes) -> tuple[Floats, Floats]:
@@ -138,7 +150,8 @@ def _express_points(bodies: Bytes) -> tuple[Floats, Floats]:
     words = np.stack([cabins[..., 0] | cabins[..., 1] << 8, cabins[..., 2] | cabins[..., 3] << 8], axis=-1)
     low = np.stack([cabins[..., 4] & 0x0F, cabins[..., 4] >> 4], axis=-1)
     corrections_deg = (low | (words & 0x03) << 4) / 8.0
-    return (words & 0xFFFC).reshape(len(bodies), -1) / 4000.0, corrections_deg.reshape(len(bodies), -1)
+    shape = len(bodies), EXPRESS_POINTS
+    return (words & 0xFFFC).reshape(shape) / 4000.0, corrections_deg.reshape(shape)
 
 
 def _dense_points(bodies: Bytes) -> tuple[Floats, Floats]:
@@ -146,9 +159,12 @@ def _dense_points(bodies: Bytes) -> tuple[Floats, Floats]:
     return words / 1000.0, np.zeros((1, 1))
 
 
-def _parse_capsules(buffer: bytes, count: int, read: Callable[[Bytes], tuple[Floats, Floats]]) -> Points:
+def _parse_capsules(
+    buffer: bytes, usual_deg: float, count: int, read: Callable[[Bytes], tuple[Floats, Floats]]
+) -> Points:
     data = np.frombuffer(buffer, np.uint8)
     pieces: list[tuple[Floats, Floats]] = []
+    spans: list[Floats] = []
     at = lost = 0
     while True:
         capsules = data[at : at + (len(data) - at) // CAPSULE_SIZE * CAPSULE_SIZE].reshape(-1, CAPSULE_SIZE)
@@ -156,9 +172,10 @@ def _parse_capsules(buffer: bytes, count: int, read: Callable[[Bytes], tuple[Flo
             break
         bad = np.flatnonzero(~_capsule_checks(capsules))
         run = capsules[: bad[0]] if len(bad) else capsules
-        theta, distance, refused = _capsule_points(run, count, read)
-        pieces.append((theta, distance))
-        lost += refused * CAPSULE_SIZE
+        span_deg, follows = _capsule_spans(run, usual_deg, count)
+        spans.append(span_deg)
+        pieces.append(_capsule_points(run, span_deg, follows, read))
+        lost += int(np.count_nonzero(~follows)) * CAPSULE_SIZE
         if not len(bad):
             at += CAPSULE_SIZE * (len(run) - 1)  # the newest waits for the next one's angle
             break
@@ -167,7 +184,8 @@ def _parse_capsules(buffer: bytes, count: int, read: Callable[[Bytes], tuple[Flo
         lost += skip - CAPSULE_SIZE * max(len(run) - 1, 0)
         at += skip
     theta_rad, distance_m = _join(pieces)
-    return Points(theta_rad, distance_m, at, lost, waiting=(len(data) - at) // CAPSULE_SIZE * count)
+    waiting = (len(data) - at) // CAPSULE_SIZE * count
+    return Points(theta_rad, distance_m, at, lost, waiting, np.concatenate([NOTHING, *spans]))
 
 
 def _capsule_checks(capsules: Bytes) -> NDArray[np.bool_]:
@@ -189,22 +207,30 @@ def _find_capsule(data: Bytes) -> int:
     return max(len(data) - 1, 1)
 
 
-def _capsule_points(
-    run: Bytes, count: int, read: Callable[[Bytes], tuple[Floats, Floats]]
-) -> tuple[Floats, Floats, int]:
-    """Points of all capsules of a run but its last, and how many capsules had to be dropped."""
-    if len(run) < 2:
-        return NOTHING, NOTHING, 0
+def _capsule_spans(run: Bytes, usual_deg: float, count: int) -> tuple[Floats, NDArray[np.bool_]]:
+    """Degrees from each capsule [n] of a run to the next one [n - 1], and whether that one continues it."""
     words = run[:, 2].astype(np.uint16) | run[:, 3].astype(np.uint16) << 8
-    start_deg = (words & 0x7FFF) / 64.0
-    span_deg = np.diff(start_deg) % 360.0
-    # A capsule that begins a stream does not continue the one before it.
-    follows = (words[1:] >> 15 == 0) & (span_deg <= CAPSULE_DEG)
-    distance_m, correction_deg = read(run[:-1, HEAD_SIZE:][follows])
+    span_deg: Floats = np.diff((words & 0x7FFF) / 64.0) % 360.0
+    begins = words[1:] >> 15 == 1  # a stream, or the unit's own count of angles, which it does in mid stream, too
+    if len(span_deg) and not math.isfinite(usual_deg):
+        usual_deg = float(np.quantile(span_deg, 0.5, method="lower"))
+    limit_deg = min(POINT_DEG * count, STRETCH * usual_deg) + SLACK_DEG
+    return span_deg, ~begins & (span_deg <= limit_deg)
+
+
+def _capsule_points(
+    run: Bytes, span_deg: Floats, follows: NDArray[np.bool_], read: Callable[[Bytes], tuple[Floats, Floats]]
+) -> tuple[Floats, Floats]:
+    """Points of those capsules of a run, without its last, that the next one follows."""
+    if not follows.any():
+        return NOTHING, NOTHING
+    kept = run[:-1][follows]
+    start_deg = ((kept[:, 2].astype(np.uint16) | kept[:, 3].astype(np.uint16) << 8) & 0x7FFF) / 64.0
+    distance_m, correction_deg = read(kept[:, HEAD_SIZE:])
+    count = distance_m.shape[1]
     share = np.arange(count) / count
-    theta_deg = start_deg[:-1][follows][:, None] + span_deg[follows][:, None] * share - correction_deg
-    theta_rad = np.radians(theta_deg % 360.0)
-    return theta_rad.reshape(-1), distance_m.reshape(-1), int(np.count_nonzero(~follows))
+    theta_deg = start_deg[:, None] + span_deg[follows][:, None] * share - correction_deg
+    return np.radians(theta_deg % 360.0).reshape(-1), distance_m.reshape(-1)
 
 
 def _join(pieces: list[tuple[Floats, Floats]]) -> tuple[Floats, Floats]:

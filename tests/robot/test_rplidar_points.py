@@ -180,3 +180,70 @@ def test_a_whole_capsule_lost_is_not_stretched_over():
     points = parse_express(capsules[:84] + capsules[168:])
     assert len(points) == 32
     assert points.theta_rad[0] == pytest.approx(theta[64], abs=0.001)
+
+
+def head(encode, count, rate_hz, sample_s, capsules=60):
+    """Capsules of a head that turns at a speed, one by one, and how far apart they begin."""
+    theta, distance = sweep(count * capsules, math.tau * rate_hz * sample_s)
+    stream = encode(theta[::count], distance.reshape(-1, count))
+    return [stream[at : at + 84] for at in range(0, len(stream), 84)], theta, distance
+
+
+EXPRESS_HEADS = [
+    (rate_hz, sample_s) for rate_hz in (2.0, 5.5, 10.0, 15.0, 17.5, 20.0) for sample_s in (250e-6, 476e-6, 508e-6)
+]
+
+
+@pytest.mark.parametrize(("rate_hz", "sample_s"), EXPRESS_HEADS)
+def test_every_speed_of_the_head_is_understood_and_a_lost_capsule_costs_no_more_than_its_neighbour(rate_hz, sample_s):
+    capsules, theta, distance = head(encode_express, 32, rate_hz, sample_s)
+    stream, got, lost = Pieces(parse_express), [], 0
+    for number, capsule in enumerate(capsules):
+        if number != 40:
+            points = stream.feed(capsule)
+            got.append(points)
+            lost += points.lost
+    found = sum(len(points) for points in got)
+    assert found == (60 - 1 - 2) * 32  # the newest waits; the lost one, and the one that it should have followed
+    assert lost == 84
+    together = [np.concatenate([getattr(points, name) for points in got]) for name in ("theta_rad", "distance_m")]
+    assert true_points(*together, theta, distance) == found
+
+
+class Pieces:
+    """A stream as the driver reads it: it remembers what capsules span."""
+
+    def __init__(self, parse):
+        self.parse, self.buffer, self.spans = parse, b"", []
+
+    def feed(self, data):
+        self.buffer += data
+        usual_deg = float(np.median(self.spans[-15:])) if len(self.spans) > 5 else math.inf
+        points = self.parse(self.buffer, usual_deg)
+        self.buffer = self.buffer[points.consumed :]
+        self.spans += points.span_deg.tolist()
+        return points
+
+
+@pytest.mark.parametrize("parse", [parse_express, parse_dense])
+@pytest.mark.parametrize(
+    "second", [seal(math.radians(9.0), bytes(80), begins=True), seal(math.radians(200.0), bytes(80))]
+)
+def test_two_capsules_of_which_none_follows_the_other_are_no_error(parse, second):
+    points = parse(seal(0.0, bytes(80)) + second)
+    assert (len(points), points.lost) == (0, 84)
+
+
+@settings(max_examples=60, deadline=None)
+@given(
+    angles=st.lists(st.floats(0.0, math.tau), max_size=40),
+    begins=st.sets(st.integers(0, 40)),
+    parse=st.sampled_from([parse_express, parse_dense]),
+    body=st.binary(min_size=80, max_size=80),
+    usual_deg=st.floats(0.0, 360.0) | st.just(math.inf),
+)
+def test_legal_capsules_in_any_order_are_no_error(angles, begins, parse, body, usual_deg):
+    data = b"".join(seal(angle, body, begins=number in begins) for number, angle in enumerate(angles))
+    points = parse(data, usual_deg)
+    assert len(data) - points.consumed <= 84
+    assert np.all((points.theta_rad >= 0.0) & (points.theta_rad < math.tau))

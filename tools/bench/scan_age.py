@@ -100,9 +100,9 @@ class Checked:
         self._newest: int | None = None
         self.missing = 0
 
-    def __call__(self, buffer: bytes) -> Points:
+    def __call__(self, buffer: bytes, usual_deg: float = math.inf) -> Points:
         """Parse as the driver does."""
-        points = self._parse(buffer)
+        points = self._parse(buffer, usual_deg)
         if len(points):
             number = np.rint(points.distance_m * 1000).astype(np.int64) - FIRST_MM
             before = number[:1] - 1 if self._newest is None else [self._newest]
