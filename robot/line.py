@@ -1,7 +1,9 @@
 """A byte line to a device: a serial port by its path, or one behind a socket by its URL. Every read has a timeout."""
 
+import contextlib
 import os
 import select
+import termios
 from pathlib import Path
 
 import serial
@@ -9,7 +11,10 @@ import serial
 from hal.errors import DeviceError
 
 READ_SIZE = 4096
+FLUSHES = 64
 WRITE_TIMEOUT_S = 0.2
+# What pyserial lets through, besides its own, from the system and its own arithmetic.
+FAULTS = (serial.SerialException, OSError, ValueError, TypeError, OverflowError, termios.error)
 
 
 class Line:
@@ -28,19 +33,22 @@ class Line:
             self._port.exclusive = True
             self._port.dtr = False  # high stops the lidar's motor
             self._port.open()
-        except (serial.SerialException, OSError, ValueError) as error:
+        except FAULTS as error:
             raise _why_not(url, error) from error
         self.has_baud = "://" not in url
 
     def fileno(self) -> int:
-        """Its descriptor, for another process to share."""
-        return int(self._port.fileno())
+        """Its descriptor, for another process to share. Raises `DeviceError` for a line that has none."""
+        try:
+            return int(self._port.fileno())
+        except FAULTS as error:
+            raise self._lost(error) from error
 
     def set_baud(self, baud: int) -> None:
         """Change the speed. Raises `DeviceError` if the port cannot."""
         try:
             self._port.baudrate = baud
-        except (serial.SerialException, OSError, ValueError) as error:
+        except FAULTS as error:
             raise DeviceError(f"{self.url} cannot do {baud} baud: {error}", "Use another serial adapter.") from error
 
     def read(self, timeout_s: float) -> bytes:
@@ -51,7 +59,7 @@ class Line:
             if not ready:
                 return b""
             data = os.read(number, READ_SIZE)
-        except (serial.SerialException, OSError, ValueError) as error:
+        except FAULTS as error:
             raise self._lost(error) from error
         if not data:
             raise self._lost("the other side closed it")
@@ -61,20 +69,23 @@ class Line:
         """Send all of it."""
         try:
             self._port.write(data)
-        except (serial.SerialException, OSError) as error:
+        except FAULTS as error:
             raise self._lost(error) from error
 
     def flush_input(self) -> None:
-        """Forget what has come and was not read."""
-        while self.read(0.0):
-            pass
+        """Forget what has come and was not read; what comes without end meanwhile is left."""
+        for _ in range(FLUSHES):
+            if not self.read(0.0):
+                break
 
     def close(self) -> None:
         """Let go of it. May be called twice."""
         left = getattr(self._port, "_socket", None)  # pyserial forgets to close it when the other side has gone
-        self._port.close()
-        if left is not None:
-            left.close()
+        with contextlib.suppress(*FAULTS):
+            self._port.close()
+        with contextlib.suppress(*FAULTS):
+            if left is not None:
+                left.close()
 
     def _lost(self, why: object) -> DeviceError:
         return DeviceError(f"{self.url} was lost: {why}", "Check plug and power; it is opened again when it is back.")

@@ -1,6 +1,7 @@
 """What the board says and is told: ROS 1 messages, through rosbags' typestore, as values of `hal.messages`."""
 
 import math
+import struct
 from typing import Any
 
 from rosbags.serde import SerdeError
@@ -64,7 +65,10 @@ _BY_TOPIC = {
 }
 NEEDED = ("cmd_vel", "pose", "velocity")
 
-_MALFORMED = (SerdeError, ValueError, TypeError, IndexError, KeyError, AttributeError, AssertionError)
+_MALFORMED = (
+    *(SerdeError, struct.error, ArithmeticError, MemoryError),
+    *(ValueError, TypeError, LookupError, AttributeError, AssertionError),
+)
 
 
 def layout_of(topic: str, md5: str) -> str | None:
@@ -82,7 +86,7 @@ def decode(layout: str, payload: bytes) -> Any:
     """Read a ROS 1 message. Raises `SensorError` for what is none."""
     try:
         return TYPES.deserialize_ros1(payload, layout)
-    except (*_MALFORMED, OverflowError) as error:
+    except _MALFORMED as error:
         raise SensorError(f"{len(payload)} bytes of the board are no {layout}: {error}") from error
 
 

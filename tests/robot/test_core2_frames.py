@@ -1,3 +1,4 @@
+import contextlib
 import math
 import re
 import struct
@@ -7,7 +8,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from hal.messages import Twist
+from hal.errors import SensorError
+from hal.messages import Odometry, Twist
 from robot.core2 import messages
 from robot.core2.board import Board
 from robot.core2.rosserial import (
@@ -23,6 +25,7 @@ from robot.core2.rosserial import (
 )
 from robot.core2.wheels import Pose, Reckoner
 from robot.settings import BaseSettings
+from sim_backend.emulators import core2 as emulated
 from sim_backend.emulators import rosserial as emulator
 
 FRAMES = [Frame(topic, bytes([topic % 256] * size)) for topic, size in [(100, 0), (125, 48), (10, 8), (127, 320)] * 5]
@@ -199,3 +202,39 @@ def test_a_board_that_counts_anew_does_not_throw_the_robot_about():
     reckoner.rebase()
     again = reckoner.step(Pose(0.0, 0.0, 0.0), (0, 0, 0), 1.0)
     assert (again.x_m, there.x_m) == (pytest.approx(0.1), pytest.approx(0.1))
+
+
+@settings(max_examples=150, deadline=None)
+@given(layout=st.sampled_from(sorted(messages.LAYOUTS.values())), payload=st.binary(max_size=512))
+def test_a_payload_is_decoded_or_refused(layout, payload):
+    with contextlib.suppress(SensorError):
+        messages.decode(layout, payload)
+
+
+@settings(max_examples=150, deadline=None)
+@given(data=st.data())
+def test_a_session_of_the_board_spoilt_anywhere_is_survived(data):
+    unit = emulated.Core2Unit(lambda _: None, lambda: Odometry(*[0.0] * 6), emulated.Firmware(boot_s=0.0))
+    unit.receive(ASK_TOPICS, 0.0)
+    session = bytearray(unit.emit(0.0) + unit.emit(0.5))
+    for at in data.draw(st.lists(st.integers(0, len(session) - 1), max_size=8)):
+        frame_at = session.rfind(b"\xff\xfe", 0, at + 1)
+        session[at] = data.draw(st.integers(0, 255))
+        reseal(session, frame_at)
+    board, buffer = Board(BaseSettings()), b""
+    for cut in range(0, len(session), 97):
+        parsed = parse_frames(buffer + bytes(session[cut : cut + 97]))
+        buffer = (buffer + bytes(session[cut : cut + 97]))[parsed.consumed :]
+        for frame in parsed.frames:
+            board.handle(frame, 1.0)
+        board.calls(1.0)
+    assert len(buffer) < 530
+    assert board.cmd_vel is None or board.cmd_vel >= 100
+
+
+def reseal(session, at):
+    """Make the check of the frame that begins here right again, if its length is."""
+    size = int.from_bytes(session[at + 2 : at + 4], "little") if at >= 0 else 0
+    end = at + 7 + size
+    if at >= 0 and end < len(session):
+        session[end] = 255 - sum(session[at + 5 : end]) % 256
