@@ -1,6 +1,7 @@
 """The Orbbec Astra's colour and depth cameras through OpenNI2."""
 
 import contextlib
+import ctypes
 import time
 from collections.abc import Callable
 from pathlib import Path
@@ -10,7 +11,7 @@ import numpy as np
 from openni import openni2
 from openni.utils import ClosedHandle, InitializationError, OpenNIError
 
-from hal.errors import DeviceError
+from hal.errors import DeviceError, SensorError
 from hal.messages import DepthImage, Image
 from hal.topics import DEPTH
 
@@ -19,6 +20,8 @@ SETTLE_S = 0.15
 INSTALL = (
     "Give the folder of Orbbec's OpenNI2 (with libOpenNI2.so and OpenNI2/Drivers in it) by --openni or OPENNI2_REDIST."
 )
+# What the package lets through: its own errors, and those of ctypes and numpy over what the driver gave.
+FAULTS = (OpenNIError, OSError, ValueError, TypeError, AttributeError, ctypes.ArgumentError)
 PLUG = "Is the Astra plugged in, and do Orbbec's udev rules let this user open it? See robot/README.md."
 
 
@@ -50,7 +53,7 @@ class OpenniSource:
             self._colour = self._open_stream("colour", self._device.create_color_stream, colour_modes, size)
             if depth:
                 self._depth = self._open_stream("depth", self._device.create_depth_stream, depth_modes, size)
-        except OpenNIError as error:
+        except FAULTS as error:
             self.close()
             raise DeviceError(f"no camera opens through OpenNI2: {words(error)}", PLUG) from error
         except DeviceError:
@@ -66,18 +69,16 @@ class OpenniSource:
                 return None
             stamp_s = time.monotonic()
             frame = ready.read_frame()
-        except OpenNIError as error:
+        except FAULTS as error:
             raise DeviceError(f"the camera was lost: {words(error)}", PLUG) from error
-        if ready is not self._depth:
-            flat = np.frombuffer(frame.get_buffer_as_uint8(), np.uint8)
-            rows = flat.reshape(frame.height, frame.stride)[:, : frame.width * 3]
-            return Image(stamp_s, rows.reshape(frame.height, frame.width, 3).copy())
-        if stamp_s < self._depth_due_s:
-            return None
-        self._depth_due_s = stamp_s + 0.5 / DEPTH.rate_hz
-        words_of_row = frame.stride // 2
-        depths = np.frombuffer(frame.get_buffer_as_uint16(), np.uint16).reshape(frame.height, words_of_row)
-        return DepthImage(stamp_s, depths[:, : frame.width].copy())
+        if ready is self._depth:
+            if stamp_s < self._depth_due_s:
+                return None
+            self._depth_due_s = stamp_s + 0.5 / DEPTH.rate_hz
+        try:
+            return depth_of(frame, stamp_s) if ready is self._depth else colour_of(frame, stamp_s)
+        except FAULTS as error:
+            raise SensorError(f"a picture of the camera cannot be read: {error}") from error
 
     def close(self) -> None:
         """Let go of the camera. The library stays loaded."""
@@ -109,9 +110,22 @@ class OpenniSource:
         return stream
 
 
+def colour_of(frame: Any, stamp_s: float) -> Image:
+    """Return the colours of a frame."""
+    flat = np.frombuffer(frame.get_buffer_as_uint8(), np.uint8)
+    rows = flat.reshape(frame.height, frame.stride)[:, : frame.width * 3]
+    return Image(stamp_s, rows.reshape(frame.height, frame.width, 3).copy())
+
+
+def depth_of(frame: Any, stamp_s: float) -> DepthImage:
+    """Return the depths of a frame, mm."""
+    depths = np.frombuffer(frame.get_buffer_as_uint16(), np.uint16).reshape(frame.height, frame.stride // 2)
+    return DepthImage(stamp_s, depths[:, : frame.width].copy())
+
+
 def quietly(end: Callable[[], object]) -> None:
     """End something that may be gone already."""
-    with contextlib.suppress(OpenNIError):
+    with contextlib.suppress(*FAULTS):
         end()
 
 
@@ -119,8 +133,8 @@ def load(folder: Path | None) -> None:
     """Load OpenNI2 from a folder, or from where OPENNI2_REDIST says. Raises `DeviceError`."""
     try:
         openni2.initialize(*([] if folder is None else [str(folder)]))
-    except (InitializationError, OpenNIError, OSError) as error:
-        why = str(error).splitlines()[-1].strip()
+    except (InitializationError, *FAULTS) as error:
+        why = (str(error).splitlines() or [type(error).__name__])[-1].strip()
         raise DeviceError(f"OpenNI2 does not load: {why}", INSTALL) from error
 
 
@@ -148,7 +162,7 @@ def name_of(device: Any) -> str:
     return str(device.get_device_info().uri.decode())
 
 
-def words(error: OpenNIError) -> str:
+def words(error: Exception) -> str:
     """Text of an error of OpenNI2, in one line."""
     message = error.args[1] if len(error.args) > 1 else error
     text = message.decode("utf-8", "replace") if isinstance(message, bytes) else str(message)

@@ -6,11 +6,12 @@ from collections.abc import Callable
 from pathlib import Path
 
 import cv2
-import numpy as np
 
-from hal.errors import DeviceError
+from hal.errors import DeviceError, SensorError
 from hal.messages import CompressedImage, DepthImage
+from hal.pictures import JPEG_START
 from hal.profile import Camera
+from robot.camera.decode import check, decode
 from robot.camera.source import Picture, Source, open_source
 
 GRAB_S = 0.2
@@ -40,7 +41,7 @@ class CameraDevice:
         self._put = put
         self._folder = openni_folder
         self._depth = depth
-        self.pictures = 0
+        self.pictures = self.unreadable = 0
 
     def session(self, stop: threading.Event, begin: Callable[[], None]) -> None:
         """Open, grab until `stop` is set or the camera is lost, and let go. Raises `DeviceError`."""
@@ -51,30 +52,45 @@ class CameraDevice:
             source.close()
 
     def _grab(self, source: Source, stop: threading.Event, begin: Callable[[], None]) -> None:
-        heard_s, patience_s = time.monotonic(), FIRST_S
+        """Hand pictures on. One that cannot be read is lost; a camera that sends no others for a while is, too."""
+        heard_s, patience_s, why = time.monotonic(), FIRST_S, ""
         while not stop.is_set():
-            picture = source.grab(GRAB_S)
+            picture = None
+            try:
+                picture = source.grab(GRAB_S)
+                if isinstance(picture, CompressedImage):
+                    picture = shrink(picture)
+            except SensorError as error:
+                picture, why = None, error.what
+                self.unreadable += 1
             now_s = time.monotonic()
             if isinstance(picture, DepthImage):
                 self._put(picture)
             elif picture is not None:
-                self._put(shrink(picture) if isinstance(picture, CompressedImage) else picture)
+                self._put(picture)
                 self.pictures += 1
                 if patience_s == FIRST_S:
                     begin()
                 heard_s, patience_s = now_s, SILENCE_S
             if now_s - heard_s > patience_s:
-                raise DeviceError(f"the camera at {self._url} sends no pictures", "Check its power, plug and network.")
+                raise self._lost(why)
+
+    def _lost(self, why: str) -> DeviceError:
+        if why:
+            what = f"the camera at {self._url} sends no pictures that can be read: {why}"
+            return DeviceError(what, "Set it to send JPEGs of a moderate size.")
+        return DeviceError(f"the camera at {self._url} sends no pictures", "Check its power, plug and network.")
 
 
 def shrink(picture: CompressedImage) -> CompressedImage:
-    """Encode a JPEG that is too large to travel again, at the best quality that fits. Raises `DeviceError`."""
+    """Encode a JPEG that is too large to travel again, at the best quality that fits.
+
+    Raises `SensorError` for what is no JPEG that may be decoded.
+    """
+    check(picture.data, JPEG_START)
     if len(picture.data) <= LIMIT_BYTES:
         return picture
-    pixels = cv2.imdecode(np.frombuffer(picture.data, np.uint8), cv2.IMREAD_COLOR)
-    if pixels is None:
-        raise DeviceError("the camera sends what is no JPEG", "Set it to send JPEGs.")
-    data = picture.data
+    pixels, data = decode(picture.data), picture.data
     for quality in QUALITIES:
         data = cv2.imencode(".jpg", pixels, [cv2.IMWRITE_JPEG_QUALITY, quality])[1].tobytes()
         if len(data) <= LIMIT_BYTES:

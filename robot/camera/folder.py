@@ -1,31 +1,37 @@
 """A folder of images, in the order of their names and over again: for tests and demonstrations."""
 
+import os
+import stat
 import time
 from pathlib import Path
 
-import cv2
 import numpy as np
 
-from hal.errors import DeviceError
+from hal.errors import DeviceError, SensorError
 from hal.messages import CompressedImage, Image
-from robot.camera.source import Picture
+from hal.pictures import JPEG_START
+from robot.camera.decode import check, decode
+from robot.camera.source import LARGEST_BYTES, Picture
 
 PERIOD_S = 1 / 15
-KINDS = {".jpg", ".jpeg", ".png", ".bmp"}
+KINDS = {".jpg", ".jpeg", ".png"}
 
 
 class FolderSource:
     """Shows the images of a folder at 15 Hz. Raises `DeviceError`."""
 
     def __init__(self, folder: Path) -> None:
-        self._paths = sorted(path for path in folder.iterdir() if path.suffix.lower() in KINDS)
+        try:
+            self._paths = sorted(path for path in folder.iterdir() if path.suffix.lower() in KINDS and path.is_file())
+        except OSError as error:
+            raise DeviceError(f"cannot read {folder}: {error.strerror}", "Check the folder.") from error
         if not self._paths:
             raise DeviceError(f"{folder} holds no image", f"Put {', '.join(sorted(KINDS))} files there.")
         self._next = 0
         self._due_s = time.monotonic()
 
     def grab(self, timeout_s: float) -> Picture | None:
-        """Return the next image, when it is due."""
+        """Return the next image, when it is due. Raises `SensorError` for a file that is none."""
         wait_s = self._due_s - time.monotonic()
         if wait_s > timeout_s:
             time.sleep(timeout_s)
@@ -41,15 +47,19 @@ class FolderSource:
 
 
 def load(path: Path) -> Picture:
-    """Read an image, as if it were taken now: a JPEG as it is, anything else as pixels. Raises `DeviceError`."""
+    """Read an image, as if it were taken now: a JPEG as it is, anything else as pixels. Raises `SensorError`."""
     stamp_s = time.monotonic()
     try:
-        data = path.read_bytes()
+        # Without O_NONBLOCK a pipe of that name would hold up the camera until somebody writes to it.
+        with os.fdopen(os.open(path, os.O_RDONLY | os.O_NONBLOCK), "rb") as file:
+            if not stat.S_ISREG(os.fstat(file.fileno()).st_mode):
+                raise SensorError(f"{path} is no file", "Take it out of the folder.")
+            data = file.read(LARGEST_BYTES + 1)
+        if len(data) > LARGEST_BYTES:
+            raise SensorError(f"{path} is larger than {LARGEST_BYTES} bytes", "Take it out of the folder.")
+        if path.suffix.lower() in {".jpg", ".jpeg"}:
+            check(data, JPEG_START)
+            return CompressedImage(stamp_s, data)
+        return Image(stamp_s, np.ascontiguousarray(decode(data)[..., ::-1], np.uint8))
     except OSError as error:
-        raise DeviceError(f"cannot read {path}: {error.strerror}", "Check the folder.") from error
-    if path.suffix.lower() in {".jpg", ".jpeg"}:
-        return CompressedImage(stamp_s, data)
-    pixels = cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_COLOR)
-    if pixels is None:
-        raise DeviceError(f"{path} is no image", "Take it out of the folder.")
-    return Image(stamp_s, np.ascontiguousarray(pixels[..., ::-1], np.uint8))
+        raise SensorError(f"cannot read {path}: {error.strerror}", "Check the folder.") from error

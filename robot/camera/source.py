@@ -7,6 +7,8 @@ from urllib.parse import urlsplit
 from hal.errors import ConfigError
 from hal.messages import CompressedImage, DepthImage, Image
 
+LARGEST_BYTES = 8_000_000  # a picture that is larger, or does not end, is none
+
 Picture = Image | CompressedImage
 
 
@@ -16,7 +18,7 @@ class Source(Protocol):
     def grab(self, timeout_s: float) -> Picture | DepthImage | None:
         """Return the newest picture, or depth, with its time of capture on the monotonic clock; None after the time.
 
-        Raises `DeviceError` when the source is lost.
+        Raises `SensorError` for a picture that cannot be read, `DeviceError` when the source is lost.
         """
 
     def close(self) -> None:
@@ -29,7 +31,10 @@ def open_source(url: str, size: tuple[int, int], openni_folder: Path | None, *, 
     `size` (width, height) is asked of sources that have a choice. Raises `DeviceError`, or `ConfigError` for a URL of
     none of these forms, or one of a source that has no `depth`.
     """
-    scheme = urlsplit(url).scheme
+    try:
+        scheme = urlsplit(url).scheme
+    except ValueError as error:
+        raise ConfigError(f"'{url}' is no address: {error}", "Give the camera's own address.") from error
     if depth and scheme != "openni":
         raise ConfigError(f"'{url}' has no depth", "Take depth = true out of the settings, or use openni:.")
     if scheme == "openni":

@@ -88,8 +88,12 @@ class Wire:
 
     def disturb(self, count: int) -> None:
         """Send the host so many bytes of noise."""
+        self.inject(self._random.randbytes(count))
+
+    def inject(self, data: bytes) -> None:
+        """Send the host these bytes, between two of the unit's words."""
         with self._lock:
-            self._noise += self._random.randbytes(count)
+            self._noise += data
 
     def close(self) -> None:
         """Unplug it for good. May be called twice."""

@@ -1,3 +1,7 @@
+import contextlib
+import os
+import socket
+import threading
 import time
 from pathlib import Path
 
@@ -7,7 +11,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from hal.errors import ConfigError, DeviceError
+from hal.errors import ConfigError, DeviceError, SensorError
 from hal.messages import CompressedImage, DepthImage, Image
 from hal.profile import load_profile
 from robot.camera.device import LIMIT_BYTES, CameraDevice, shrink
@@ -27,6 +31,9 @@ def jpeg(gray, size=(64, 48), noise=0.0):
     if noise:
         pixels = np.random.default_rng(0).integers(0, 255, pixels.shape).astype(np.uint8)
     return cv2.imencode(".jpg", pixels, [cv2.IMWRITE_JPEG_QUALITY, 95])[1].tobytes()
+
+
+LARGE_JPEG, SMALL_JPEG = jpeg(0, (640, 480), noise=1.0), jpeg(50)
 
 
 class Watch:
@@ -139,6 +146,142 @@ def test_what_is_no_camera_is_said_with_the_remedy(tmp_path):
         with pytest.raises(error, match=what) as refused:
             open_source(url, (640, 480), None)
         assert refused.value.remedy
+
+
+def claiming(data, width=65500, height=65500):
+    """A JPEG whose frame header says that it is larger."""
+    at = data.index(b"\xff\xc0")
+    return data[: at + 5] + height.to_bytes(2) + width.to_bytes(2) + data[at + 9 :]
+
+
+@pytest.mark.parametrize("size", [(16, 12), (640, 480)])
+def test_a_picture_that_claims_too_much_is_lost_and_the_next_one_shown(size):
+    server = MjpegServer()
+    server.show(jpeg(50))
+    with Watch(server.url) as watch:
+        watch.wait(1)
+        server.show(claiming(jpeg(0, size, noise=1.0)))
+        until_s = time.monotonic() + 3.0
+        while not watch.device.unreadable:
+            assert time.monotonic() < until_s
+            time.sleep(0.01)
+        server.show(jpeg(60))
+        assert watch.wait(2).data == jpeg(60)
+        assert watch.keeper.losses == 0
+    server.close()
+
+
+def test_a_camera_whose_pictures_cannot_be_read_is_lost_and_says_why(monkeypatch):
+    monkeypatch.setattr("robot.camera.device.FIRST_S", 0.5)
+    server = MjpegServer()
+    server.show(b"<html>no picture</html>")
+    with Watch(server.url) as watch:
+        until_s = time.monotonic() + 4.0
+        while watch.keeper.failure is None:
+            server.show(b"<html>no picture</html>")
+            assert time.monotonic() < until_s
+            time.sleep(0.02)
+        assert "no pictures that can be read: a picture of 23 bytes was refused: no JPEG" in str(watch.keeper.failure)
+        assert not watch.pictures
+    server.close()
+
+
+def test_what_is_no_picture_in_a_folder_is_passed_over(tmp_path):
+    (tmp_path / "a.jpg").write_bytes(jpeg(10))
+    for name in ("b.png", "c.jpg"):
+        (tmp_path / name).write_bytes(b"")
+    (tmp_path / "d.jpg").write_text("ten bytes.")
+    (tmp_path / "e.png").mkdir()
+    os.mkfifo(tmp_path / "f.png")
+    (tmp_path / "g.png").symlink_to("/dev/zero")
+    cv2.imwrite(str(tmp_path / "h.png"), np.full((3, 4, 4), 65535, np.uint16))
+    png = bytearray((tmp_path / "h.png").read_bytes())
+    png[16:24] = (65500).to_bytes(4) * 2
+    (tmp_path / "i.png").write_bytes(png)
+    (tmp_path / "j.jpg").write_bytes(jpeg(200, (640, 480), noise=1.0)[:70_000])
+    with Watch(str(tmp_path)) as watch:
+        watch.wait(6)
+        assert watch.keeper.losses == 0
+        assert watch.device.unreadable >= 4
+    colours = [picture.data for picture in watch.pictures if isinstance(picture, Image)]
+    assert colours[0].tolist() == [[[255] * 3] * 4] * 3
+
+
+@contextlib.contextmanager
+def raw_stream(*pieces):
+    """An MJPEG server that sends these bytes, with a pause after each; yields its URL and who has asked."""
+    listener = socket.create_server(("127.0.0.1", 0))
+    listener.settimeout(0.05)
+    stop, asked = threading.Event(), []
+
+    def serve():
+        while not stop.is_set():
+            with contextlib.suppress(OSError):
+                connection, _ = listener.accept()
+                asked.append(connection)
+                connection.settimeout(5.0)
+                connection.recv(4096)
+                connection.sendall(b"HTTP/1.0 200 OK\r\nContent-Type: multipart/x-mixed-replace; boundary=x\r\n\r\n")
+                for piece in pieces:
+                    connection.sendall(piece)
+                    stop.wait(0.1)
+
+    thread = threading.Thread(target=serve)
+    thread.start()
+    yield f"http://127.0.0.1:{listener.getsockname()[1]}/", asked
+    stop.set()
+    thread.join()
+    for connection in asked:
+        connection.close()
+    listener.close()
+
+
+def part(body, head=b"Content-Type: image/jpeg\r\n\r\n"):
+    return b"--x\r\n" + head + body + b"\r\n"
+
+
+@pytest.mark.parametrize(
+    "odd",
+    [
+        part(b"", b"X: " + b"y" * 20_000),
+        part(b"", b"Content-Length: 99999999999\r\n\r\n"),
+        part(b"", b"Content-Length: " + b"9" * 5000 + b"\r\n\r\n"),
+        part(b"z" * 600_000),
+        b"--x" * 10_000,
+        b"\0" * 300_000,
+    ],
+    ids=["endless head", "long", "longest", "endless body", "boundaries", "noise"],
+)
+def test_an_odd_part_of_a_stream_is_passed_over(odd, monkeypatch):
+    monkeypatch.setattr("robot.camera.mjpeg.LARGEST_BYTES", 500_000)
+    with raw_stream(part(jpeg(1)), odd, part(jpeg(2)) * 2) as (url, asked), Watch(url) as watch:
+        assert watch.wait(2).data == jpeg(2)
+        assert len(asked) == 1
+
+
+@settings(max_examples=100, deadline=None)
+@given(
+    st.lists(
+        st.sampled_from([b"--x", b"\r\n", b"\r\n\r\n", b"Content-Length: ", b"7", b"-1", b"a" * 9000]), max_size=60
+    )
+)
+def test_what_is_left_of_a_stream_is_bounded_and_nothing_is_found_twice(pieces):
+    data = b"".join(pieces)
+    bodies, rest = parse_parts(data, b"x")
+    assert len(rest) <= len(data)
+    assert sum(map(len, bodies)) + len(rest) <= len(data)
+    again, _ = parse_parts(rest, b"x")
+    assert again == []
+
+
+@settings(max_examples=100, deadline=None)
+@given(data=st.data(), large=st.booleans())
+def test_a_spoilt_picture_is_small_or_refused(data, large):
+    spoilt = bytearray(LARGE_JPEG if large else SMALL_JPEG)
+    for at in data.draw(st.lists(st.integers(0, min(len(spoilt), 700) - 1), min_size=1, max_size=6)):
+        spoilt[at] = data.draw(st.sampled_from([0, 0xFF, 0xC0, 0xC2, 0xD8, 0xDA, 0x7F]))
+    with contextlib.suppress(SensorError):
+        assert len(shrink(CompressedImage(1.0, bytes(spoilt))).data) <= len(spoilt)
 
 
 def test_a_page_that_is_no_stream_is_refused():
