@@ -228,15 +228,18 @@ def raw_stream(*pieces):
 
     thread = threading.Thread(target=serve)
     thread.start()
-    yield f"http://127.0.0.1:{listener.getsockname()[1]}/", asked
-    stop.set()
-    thread.join()
-    for connection in asked:
-        connection.close()
-    listener.close()
+    try:
+        yield f"http://127.0.0.1:{listener.getsockname()[1]}/", asked
+    finally:
+        stop.set()
+        thread.join()
+        for connection in asked:
+            connection.close()
+        listener.close()
 
 
-def part(body, head=b"Content-Type: image/jpeg\r\n\r\n"):
+def part(body, head=b""):
+    head = head or b"Content-Type: image/jpeg\r\nContent-Length: %d\r\n\r\n" % len(body)
     return b"--x\r\n" + head + body + b"\r\n"
 
 
@@ -246,7 +249,7 @@ def part(body, head=b"Content-Type: image/jpeg\r\n\r\n"):
         part(b"", b"X: " + b"y" * 20_000),
         part(b"", b"Content-Length: 99999999999\r\n\r\n"),
         part(b"", b"Content-Length: " + b"9" * 5000 + b"\r\n\r\n"),
-        part(b"z" * 600_000),
+        part(b"z" * 600_000, b"X: y\r\n\r\n"),
         b"--x" * 10_000,
         b"\0" * 300_000,
     ],
