@@ -277,6 +277,16 @@ def test_what_is_left_of_a_stream_is_bounded_and_nothing_is_found_twice(pieces):
     assert again == []
 
 
+ODD = st.binary(max_size=300) | st.builds(part, st.binary(max_size=300)) | st.just(claiming(LARGE_JPEG)).map(part)
+
+
+@settings(max_examples=6, deadline=None)
+@given(st.lists(ODD, max_size=4).map(b"".join))
+def test_whatever_a_camera_sends_it_shows_the_next_picture(odd):
+    with raw_stream(odd, part(jpeg(2)) * 2) as (url, _), Watch(url) as watch:
+        assert watch.wait(1, 10.0).data == jpeg(2)
+
+
 @settings(max_examples=100, deadline=None)
 @given(data=st.data(), large=st.booleans())
 def test_a_spoilt_picture_is_small_or_refused(data, large):

@@ -2,6 +2,8 @@ import math
 import time
 
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 from hal.errors import DeviceError
 from hal.messages import STOP, Odometry, Twist
@@ -9,6 +11,7 @@ from robot.core2.device import Core2
 from robot.keeper import Keeper
 from robot.settings import BaseSettings
 from sim_backend.emulators.core2 import Core2Unit, Firmware
+from sim_backend.emulators.rosserial import encode, topic_info
 from sim_backend.emulators.wire import Wire
 
 FAST = Firmware(boot_s=0.1)
@@ -166,6 +169,20 @@ def test_after_a_reset_of_the_board_it_negotiates_anew(tmp_path):
         assert not bench.unit.crashed
 
 
+def test_no_farewell_goes_to_a_board_that_has_announced_nothing_since_it_was_lost(tmp_path):
+    with Bench(tmp_path / "base") as bench:
+        bench.keep(Twist(0.2, 0.0), 0.2)
+        bench.wire.mute = True
+        bench.unit.reset(0.1)
+        bench.keep(Twist(0.2, 0.0), 0.7)
+        zeros = bench.unit.obeyed_unannounced
+        assert zeros  # the ones that a silent board gets
+        bench.keeper.close()
+        time.sleep(0.1)
+        assert bench.unit.obeyed_unannounced == zeros
+        assert bench.twists[-1] == STOP
+
+
 def test_garbage_is_counted_and_survived(tmp_path):
     with Bench(tmp_path / "base") as bench:
         bench.wire.disturb(400)
@@ -198,3 +215,30 @@ def test_an_id_that_was_never_announced_crashes_the_emulated_board():
     unit.receive(b"", 0.0)
     unit.receive(bytes.fromhex("fffe0000ffc80037"), 1.0)
     assert unit.crashed
+
+
+@pytest.fixture(scope="module")
+def running(tmp_path_factory):
+    with Bench(tmp_path_factory.mktemp("wire") / "base") as bench:
+        yield bench
+
+
+FRAMES = st.builds(encode, st.integers(0, 200), st.binary(max_size=600))
+ANNOUNCEMENTS = st.builds(
+    lambda way, number, name, md5: encode(way, topic_info(number, name, "kind", md5)),
+    st.integers(0, 3),
+    st.integers(0, 200),
+    st.sampled_from(["pose", "imu", "battery", "range/fl", "buttons", "else"]),
+    st.sampled_from(["", "0" * 32, "9f195f881246fdfa2798d1d3eebca84a"]),
+)
+
+
+@settings(max_examples=12, deadline=None)
+@given(st.lists(st.binary(max_size=200) | FRAMES | ANNOUNCEMENTS, max_size=6).map(b"".join))
+def test_whatever_comes_over_its_line_it_measures_on(running, odd):
+    running.wire.inject(odd)
+    time.sleep(0.05)
+    now_s = time.monotonic()
+    wait_for(lambda: running.base.answers and running.base.readings.odom.stamp_s > now_s, 10.0)
+    assert running.keeper.losses == 0
+    assert not running.unit.crashed

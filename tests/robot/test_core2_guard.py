@@ -79,6 +79,18 @@ def test_a_driver_that_is_killed_or_frozen_stops_at_once(board, driver, number):
     assert not board.unit.crashed
 
 
+def test_a_guard_that_has_struck_writes_nothing_to_a_board_that_has_begun_anew(board, driver):
+    driver.send_signal(signal.SIGSTOP)
+    board.wait_for(STOP)
+    time.sleep(0.6)  # its zeros are out
+    board.unit.reset(0.1)
+    time.sleep(0.4)
+    driver.kill()
+    time.sleep(0.3)
+    assert board.unit.obeyed_unannounced == 0
+    assert board.given[-1][1] == STOP
+
+
 def test_the_guard_ends_with_its_driver(board, driver):
     guards = children(driver.pid)
     assert len(guards) == 1

@@ -8,6 +8,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 from hal.errors import DeviceError
 from hal.profile import load_profile
@@ -15,7 +17,7 @@ from robot.keeper import Keeper
 from robot.rplidar import protocol
 from robot.rplidar.device import RPLidar
 from robot.settings import LidarSettings
-from sim_backend.emulators.rplidar import DENSE_MODE, EXPRESS_MODE, STANDARD_MODE, Model, RplidarUnit
+from sim_backend.emulators.rplidar import DENSE_MODE, EXPRESS_MODE, STANDARD_MODE, Model, RplidarUnit, descriptor, seal
 from sim_backend.emulators.wire import Wire
 
 LIDAR = load_profile("rosbot2").lidar
@@ -225,3 +227,28 @@ def test_the_motor_stops_on_sigterm_and_a_killed_program_does_not_spoil_the_next
     assert (bench.unit.pwm > 0) == (number == signal.SIGKILL)
     with bench:
         assert around(bench.wait_scans(1), 0) == pytest.approx(1.0, abs=0.02)
+
+
+@pytest.fixture(scope="module", params=["EXPRESS", "DENSE", "STANDARD"])
+def scanning(request, tmp_path_factory):
+    modes = {"EXPRESS": EXPRESS_MODE, "DENSE": DENSE_MODE, "STANDARD": STANDARD_MODE}
+    with Bench(tmp_path_factory.mktemp("wire") / "lidar", Model(modes=(modes[request.param],))) as bench:
+        bench.wait_scans(1)
+        yield bench
+
+
+CAPSULES = st.builds(
+    lambda start, body, begins: seal(start, body, begins=begins),
+    st.floats(0.0, math.tau),
+    st.binary(min_size=80, max_size=80),
+    st.booleans(),
+)
+HEADS = st.builds(descriptor, st.integers(0, 2**30 - 1), st.integers(0, 255))
+
+
+@settings(max_examples=8, deadline=None)
+@given(st.lists(st.binary(max_size=200) | CAPSULES | HEADS, max_size=8).map(b"".join))
+def test_whatever_comes_over_its_line_it_scans_on(scanning, odd):
+    scanning.wire.inject(odd)
+    scanning.wait_scans(3, 10.0)
+    assert scanning.keeper.losses == 0
