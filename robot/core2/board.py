@@ -84,6 +84,14 @@ class Board:
         """Have the board's service `config` called, until it answers; what it says comes into `answers`."""
         self._errands.want(command, data)
 
+    def forget_calls(self) -> None:
+        """Nothing is to be called any more."""
+        self._errands.forget()
+
+    def unanswered_s(self, now_s: float) -> float:
+        """For how long a call has been repeated without an answer."""
+        return self._errands.unanswered_s(now_s)
+
     def calls(self, now_s: float) -> bytes:
         """Return what has to be sent now for `configure`, and the time if it asked; nothing before it is `ready`."""
         config = self._config

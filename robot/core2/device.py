@@ -25,6 +25,9 @@ FRAME_S = 1.0  # a board at this speed answers with a frame by then
 LEARN_S = 3.0
 ASK_S = 1.0
 LOST_S = 10.0
+# A board that is heard may hear nothing. Its watchdog then stops it, and it would drive off by itself when the line is
+# mended: so it is called so often, and lost after so long without an answer, which is four calls.
+CALL_S, DEAF_S = 0.5, 0.7
 # Commands go out no faster: what a board that resets does not read waits in its port (768 bytes), and there has to be
 # room for the zeros of its silence behind the commands that came before it.
 SPACE_S = 0.02
@@ -64,7 +67,7 @@ class Core2:
         self._motors_told: bool | None = None
         self._answers = False
         self._guard: Guard | None = None
-        self._held_until_s = self._sent_s = -math.inf
+        self._held_until_s = self._sent_s = self._call_s = -math.inf
         self.baud: int | None = None
         self.counts = Counts()
         self.losses = 0  # how often the board was silent, began anew, or was stopped by the guard; only grows
@@ -108,7 +111,7 @@ class Core2:
             buffer = self._find_speed(line)
             self._serve(line, buffer, stop, begin)
         finally:
-            self._answers = False
+            self._lose()
             self._dismiss_guard()
             self._say_farewell(line)
             line.close()
@@ -180,13 +183,15 @@ class Core2:
         parsed = parse_frames(buffer)
         self.counts.lost_bytes += parsed.lost
         self.counts.frames += len(parsed.frames)
+        deaf = board.unanswered_s(now_s) > DEAF_S
         read, announced, before = board.read, board.announced, contact.state
         for frame in parsed.frames:
             board.handle(frame, now_s)
-        state = contact.step(now_s, read=board.read > read, announced=board.announced > announced, ready=board.ready)
+        heard, told = board.read > read and not deaf, board.announced > announced
+        state = contact.step(now_s, read=heard, announced=told, ready=board.ready)
         if state is State.LEARNING and before is not State.LEARNING:
             self._dismiss_guard()  # what it would write the board may have forgotten
-            if board.announced == announced:
+            if not told:
                 board.forget()
         answer = b"" if state is State.SILENT else board.calls(now_s)
         if answer:
@@ -194,8 +199,8 @@ class Core2:
         return buffer[parsed.consumed :], state
 
     def _lose(self) -> None:
-        """The board is silent, or begins anew: whatever was commanded before counts no more."""
-        self.losses += 1
+        """The board is silent, begins anew or is left: whatever was commanded before counts no more."""
+        self.losses += self._answers  # first: who sees it lost finds it counted
         self._answers = False
         with self._lock:
             self._until_s = -math.inf
@@ -213,7 +218,8 @@ class Core2:
             self._dismiss_guard()
             self._guard = Guard(line.fileno(), self._frame_of(STOP))
             self.counts.negotiations += 1
-            self._board.configure("EWCH", "1")
+            self._board.forget_calls()
+            self._call_s = -math.inf
             self._motors_told = None
         if self.losses:
             self._held_until_s = time.monotonic() + HELD_S
@@ -238,6 +244,9 @@ class Core2:
         line.write(self._frame_of(twist))
         self._sent_s = now_s
         self.counts.commands += 1
+        if not silent and now_s >= self._call_s:
+            self._call_s = now_s + CALL_S
+            self._board.configure("EWCH", "1")
         if not silent and self._motors_told is not off and (braked or not off):
             self._motors_told = off
             self._board.configure("EMOT", "0" if off else "1")

@@ -15,7 +15,7 @@ class Errands:
     def __init__(self) -> None:
         self._waiting: dict[str, str] = {}
         self._under_way: tuple[str, str] | None = None
-        self._again_s = -math.inf
+        self._again_s = self._first_s = -math.inf
 
     def forget(self) -> None:
         """Nothing has to be told any more."""
@@ -36,5 +36,11 @@ class Errands:
         """Return the frame that has to go out now; nothing while an answer may still come."""
         if not self._waiting or (self._under_way is not None and now_s < self._again_s):
             return b""
+        if self._under_way is None:
+            self._first_s = now_s
         self._under_way, self._again_s = next(iter(self._waiting.items())), now_s + AGAIN_S
         return encode(*self._under_way)
+
+    def unanswered_s(self, now_s: float) -> float:
+        """For how long the board has been called without an answer."""
+        return 0.0 if self._under_way is None else now_s - self._first_s

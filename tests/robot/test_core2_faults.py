@@ -126,6 +126,11 @@ def test_a_board_that_hears_no_more_is_stopped_by_its_own_watchdog(rig):
     rig.keep(GO, 2.0)
     assert rig.wheels.speed_m_s == 0.0
     assert WATCHDOG_S < rig.wheels.stood_s - cut_s < WATCHDOG_S + 0.35
+    before_m = rig.wheels.travel_m
+    rig.wire.deaf = False
+    rig.keep(GO, 2.0)
+    assert rig.wheels.travel_m == before_m
+    rig.get_going()
 
 
 def test_a_hiccup_of_the_line_is_a_loss_too(rig):

@@ -133,7 +133,9 @@ def test_a_call_is_repeated_until_it_is_answered_and_the_next_waits_for_it():
     assert calls(0.0) == [("EWCH", "1")]
     assert calls(AGAIN_S / 2) == []
     assert calls(AGAIN_S) == [("EWCH", "1")]
+    assert errands.unanswered_s(2 * AGAIN_S) == 2 * AGAIN_S  # since the first try
     errands.answered()
+    assert errands.unanswered_s(9.0) == 0.0
     assert calls(AGAIN_S) == [("EMOT", "0")]
     errands.want("EMOT", "1")  # the newest wish counts, whatever the answer to the old one is
     errands.answered()
