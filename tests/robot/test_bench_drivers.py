@@ -40,7 +40,7 @@ def test_missing_samples_are_noticed():
     pieces = [np.arange(0, 5), np.arange(5, 8), NOTHING, np.arange(10, 12), np.arange(0, 3)]
     metres = iter([(piece + FIRST_MM) / 1000.0 for piece in pieces])
 
-    def parse(buffer):
+    def parse(buffer, usual_deg):
         distance_m = next(metres)
         return Points(distance_m, distance_m)
 

@@ -6,7 +6,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from robot.rplidar import protocol
 from robot.rplidar.points import Points, parse_dense, parse_express, parse_standard
+from robot.rplidar.protocol import Answer
 from sim_backend.emulators.rplidar import encode_dense, encode_express, encode_nodes, seal
 
 STEP_RAD = math.radians(0.9)
@@ -247,3 +249,16 @@ def test_legal_capsules_in_any_order_are_no_error(angles, begins, parse, body, u
     points = parse(data, usual_deg)
     assert len(data) - points.consumed <= 84
     assert np.all((points.theta_rad >= 0.0) & (points.theta_rad < math.tau))
+
+
+@settings(max_examples=80, deadline=None)
+@given(
+    noise=st.binary(max_size=60), size=st.integers(0, 2**30 - 1), kind=st.sampled_from(list(Answer)), body=st.binary()
+)
+def test_an_answer_is_found_whole_or_not_at_all(noise, size, kind, body):
+    data = noise + protocol.encode_descriptor(protocol.Descriptor(size, stream=False, kind=kind)) + body
+    found = protocol.find_any_answer(data, kind)
+    assert found is None or len(found) <= len(data)
+    protocol.parse_conf(found or b"", protocol.Conf.US_PER_SAMPLE)
+    stream = protocol.find_stream(data, kind)
+    assert stream is None or data.endswith(stream)
