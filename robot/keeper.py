@@ -28,6 +28,7 @@ class Keeper:
         self._thread: threading.Thread | None = None
         self._failure: BaseException | None = None
         self.sessions = 0
+        self.losses = 0  # how often a device that worked was lost
 
     @property
     def alive(self) -> bool:
@@ -73,6 +74,7 @@ class Keeper:
                 self._failure = error
                 return
             finally:
+                self.losses += self.alive  # counted first: whoever sees it lost has the count
                 self._alive.clear()
                 self._failed.set()
             self._stop.wait(RETRY_S)

@@ -64,6 +64,7 @@ class Core2:
         self._held_until_s = -math.inf
         self.baud: int | None = None
         self.counts = Counts()
+        self.losses = 0  # how often it could not be driven any more: a reset, silence, a strike of its guard
 
     @property
     def readings(self) -> Readings:
@@ -104,7 +105,7 @@ class Core2:
             buffer = self._find_speed(line)
             self._serve(line, buffer, stop, begin)
         finally:
-            self._answers = False
+            self._lose()
             self._dismiss_guard()
             self._say_farewell(line)
             line.close()
@@ -146,7 +147,7 @@ class Core2:
                 board.forget()
                 learning_s = now_s
             if not board.ready:
-                self._answers = False
+                self._lose()
                 if now_s - learning_s > LEARN_S:
                     raise DeviceError(f"the base board lacks {', '.join(board.missing) or 'config'}", FIRMWARE)
                 if now_s - asked_s > ASK_S:
@@ -184,6 +185,10 @@ class Core2:
         self._motors_told = None
         self._answers = True
 
+    def _lose(self) -> None:
+        self.losses += self._answers
+        self._answers = False
+
     def _dismiss_guard(self) -> None:
         if self._guard is not None:
             self._guard.close()
@@ -195,6 +200,7 @@ class Core2:
         assert self._guard is not None
         if self._guard.tell():
             self._held_until_s = now_s + HELD_S
+            self.losses += 1
         with self._lock:
             off, braked = self._motors_off, now_s >= self._power_until_s
             held = off or now_s < self._held_until_s
