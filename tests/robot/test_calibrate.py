@@ -163,7 +163,7 @@ def test_it_refuses_what_is_not_safe_and_writes_nothing(tmp_path, capsys, monkey
         monkeypatch.setattr("sim_backend.emulators.core2.VOLTAGE_V", 10.2)
         assert "battery is at 10.2 V" in refused([*words, *lidar], capsys)
         with contextlib.closing(Line(words[3], 525000)):
-            assert "in use" in refused([*words, "--yes"], capsys)
+            assert "in use" in refused([*words, *NO_FIELD, "--yes"], capsys)
     assert (tmp_path / "mine.toml").read_text() == QUICK
     assert room.true == (0.0, 0.0, 0.0)
 
