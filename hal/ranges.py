@@ -11,11 +11,12 @@ After REP-117. In a scan whose own limits make no sense (nan, negative, or empty
 """
 
 import numpy as np
+from numpy.typing import NDArray
 
 from hal.messages import FloatArray, LaserScan
 
 
-def read_ranges(scan: LaserScan, beams: "np.typing.NDArray[np.intp] | None" = None) -> FloatArray:
+def read_ranges(scan: LaserScan, beams: NDArray[np.intp] | None = None) -> FloatArray:
     """Return a scan's ranges, float32 [n], or those of `beams` alone, as the table says."""
     ranges: FloatArray = np.asarray(scan.ranges, dtype=np.float32)
     ranges = ranges.copy() if beams is None else ranges[beams]
