@@ -151,7 +151,7 @@ def test_a_reset_of_the_board_stops_it_until_the_board_is_back(tmp_path):
         keep(robot, GO, 0.3)
         bench.base.firmware = Firmware(boot_s=1.2)
         bench.base.reset()
-        assert keep(robot, GO, 2.0, lambda applied: bool(applied.clamps)).clamps == ("no_base",)
+        assert "no_base" in keep(robot, GO, 2.0, lambda applied: "no_base" in applied.clamps).clamps
         assert keep(robot, GO, 5.0, waits).twist == STOP
         keep(robot, GO, 0.2)
         assert bench.twin.state().linear_m_s == 0.0
