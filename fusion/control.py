@@ -69,8 +69,11 @@ class ControlLoop:
     def arm(self) -> None:
         """Send the neutral command that a stopped robot asks for before it moves, and let one period pass.
 
-        Once more if the answer is that it stands: a remote robot says so first, and is armed by who knows it.
+        The teacher's hand, if it was on the wheel, lets go first: else it would be in charge. The command is sent once
+        more if the answer is that the robot stands: a remote one says so first, and is armed by who knows it.
         """
+        if self._taught:
+            self._teach(None, self._robot.read().seq)
         for _ in range(2):
             stop = Command(STOP, self._robot.now(), answers=self._robot.read().seq)
             if self._robot.drive(stop).reason not in HELD:

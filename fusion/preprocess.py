@@ -13,6 +13,7 @@ from hal.errors import SensorError
 from hal.messages import ByteArray, CompressedImage, FloatArray, Image, LaserScan, Observation
 from hal.profile import Features as FeatureShape
 from hal.profile import RobotProfile
+from hal.ranges import read_ranges
 
 # Beam angles arrive as float32, so a beam that lies on the edge between two bins is off by less than this.
 EDGE_BINS = 1e-3
@@ -78,20 +79,16 @@ def bin_scan(scan: LaserScan, shape: FeatureShape) -> tuple[FloatArray, int]:
 
     Returns float32 [bins] (counter-clockwise, the nearest return of each bin over `max_range_m`; 1.0: no return,
     0.0: too close) and the number of invalid beams. A bin without a valid beam takes its nearest neighbour's value.
-    Ranges after REP-117; a finite range that is not positive is invalid too, as older drivers write 0 for "none".
+    Which beams are valid, too close or without a return is as `hal.ranges` has it.
     Raises `SensorError` for a scan that does not cover the field of view or that is invalid in most of it.
     """
-    ranges = np.asarray(scan.ranges, dtype=np.float32)
-    if ranges.ndim != 1:
+    if np.ndim(scan.ranges) != 1:
         raise ReadingError(
-            "scan shape", f"the scan has {ranges.ndim} dimensions instead of 1", "Check the lidar driver."
+            "scan shape", f"the scan has {np.ndim(scan.ranges)} dimensions instead of 1", "Check the lidar driver."
         )
-    layout = _layout(ranges.size, scan.angle_min, scan.angle_increment, shape.fov_rad, shape.bins)
-    beams = ranges[layout.beams]
-    bad = np.isnan(beams) | ((beams <= 0.0) & np.isfinite(beams))
-    invalid = int(np.count_nonzero(bad))
-    if invalid:
-        beams[bad] = np.nan
+    layout = _layout(len(scan.ranges), scan.angle_min, scan.angle_increment, shape.fov_rad, shape.bins)
+    beams = read_ranges(scan, layout.beams)
+    invalid = int(np.count_nonzero(np.isnan(beams)))
     nearest = np.full(shape.bins, np.nan, dtype=np.float32)
     nearest[layout.bins] = np.fmin.reduceat(beams, layout.starts)
     if invalid or layout.bins.size < shape.bins:

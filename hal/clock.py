@@ -4,6 +4,8 @@ from collections import deque
 
 # Long enough for one prompt message among late ones, short enough to follow a robot whose time runs slower.
 WINDOW_S = 0.25
+# An estimate of another's clock lags. A stamp further ahead than this is not honest, and could keep what is old alive.
+AHEAD_S = 0.1
 
 
 class ClockEstimate:
@@ -37,3 +39,12 @@ class ClockEstimate:
         """Seconds on the robot's clock at `local_s`; only when `known`."""
         self._latest_s = max(self._latest_s, local_s + max(offset_s for _, offset_s in self._offsets))
         return self._latest_s
+
+
+def is_fresh(stamp_s: float, now_s: float, max_age_s: float) -> bool:
+    """Whether what was captured at `stamp_s` counts at `now_s`. Never with a stamp that is not finite.
+
+    Far ahead is no better than too old: such a stamp is of another clock, or of this one before it started anew, and
+    would stay fresh for too long.
+    """
+    return -AHEAD_S <= now_s - stamp_s <= max_age_s

@@ -4,9 +4,9 @@ import sys
 import threading
 import time
 
+from hal.arming import State
 from hal.bus import Bus
 from hal.governed import GovernedRobot
-from hal.governor import State
 from hal.inlet import Inlet
 from hal.messages import DiagnosticArray, DiagnosticStatus
 from hal.refusals import LINK
@@ -48,6 +48,8 @@ class Reporter:
 
     def run(self, stop: threading.Event) -> None:
         """Report until `stop` is set."""
+        if self._robot.field_off:
+            print(f"{self._bus.robot}: {self._robot.field_off}", file=sys.stderr, flush=True)
         while not stop.wait(1.0 / DIAGNOSTICS.rate_hz):
             trouble = self._watch.look(self._bus.short_peers(), time.monotonic())
             if trouble and trouble != self._said:
@@ -68,8 +70,11 @@ class Reporter:
         state = self._robot.state
         counts = self._robot.refused | {"undecodable": self._inlet.dropped}
         values = tuple((f"refused: {reason}", str(count)) for reason, count in sorted(counts.items()))
-        level = WARN if state in (State.STOPPED, State.EMERGENCY) else OK
-        return DiagnosticStatus(level, f"{self._bus.robot}: governor", state.value, values)
+        values += (("device losses", str(self._robot.losses)),)
+        if self._robot.field_off:
+            values += (("protective field", self._robot.field_off),)
+        well = state in (State.DISARMED, State.ARMED) and not self._robot.field_off
+        return DiagnosticStatus(OK if well else WARN, f"{self._bus.robot}: governor", state.value, values)
 
     def _link(self, trouble: str) -> DiagnosticStatus:
         values = (

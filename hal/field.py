@@ -5,8 +5,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from hal.clock import is_fresh
 from hal.messages import LaserScan
 from hal.profile import Field, RobotProfile
+from hal.ranges import read_ranges
 
 CONE_RAD = math.radians(30.0)  # to each side of the direction of motion: here the lidar must really see
 SEEN = 0.75  # share of the beams in that cone that must say something
@@ -22,20 +24,25 @@ class Clearance:
 
 
 def measure_clearance(profile: RobotProfile, field: Field, scan: LaserScan) -> Clearance:
-    """Find the nearest point in the way, either way. What is too close for the lidar counts as at its shortest range.
+    """Find the nearest point in the way, either way.
 
-    Where the lidar does not look at all (behind a sector) the way counts as free.
+    What is too close for the lidar counts as at its shortest range, and is in the way to where its beam looks. Where
+    the lidar does not look at all (behind a sector) the way counts as free.
     """
     angles = scan.angle_min + scan.angle_increment * np.arange(len(scan.ranges))
-    ranges = np.where(np.isneginf(scan.ranges), scan.range_min, scan.ranges)
+    ranges = read_ranges(scan)
+    too_close = np.isneginf(ranges)
+    ranges[too_close] = scan.range_min
     near_m = np.where(np.isfinite(ranges), ranges, np.nan)  # nothing there is nothing in the way
-    x_m, y_m = profile.lidar.x_m + near_m * np.cos(angles), near_m * np.sin(angles)
-    in_the_way = np.abs(y_m) <= profile.base.width_m / 2 + field.margin_m
+    ahead_m, left_m = near_m * np.cos(angles), near_m * np.sin(angles)
+    x_m = profile.lidar.x_m + ahead_m
+    side_m = np.where(too_close, np.cos(angles), x_m)  # its sign says on which side it is in the way
+    in_the_way = np.abs(left_m) <= profile.base.width_m / 2 + field.margin_m
 
     def free_m(sign: int) -> float:
         if _is_blind(profile, angles if sign > 0 else angles - math.pi, ranges, sign):
             return 0.0
-        distances_m = (sign * x_m)[in_the_way & (sign * x_m > 0.0)]
+        distances_m = (sign * x_m)[in_the_way & (sign * side_m >= 0.0)]
         return max(float(distances_m.min(initial=math.inf)) - profile.base.length_m / 2, 0.0)
 
     return Clearance(scan.stamp_s, free_m(1), free_m(-1))
@@ -54,7 +61,7 @@ def limit_speed(field: Field, clearance: Clearance | None, linear_m_s: float, no
     """Return the speed that the field allows and the name of what cut it, "" for nothing."""
     if linear_m_s == 0.0:
         return 0.0, ""
-    if clearance is None or not abs(now_s - clearance.stamp_s) <= field.max_age_s:
+    if clearance is None or not is_fresh(clearance.stamp_s, now_s, field.max_age_s):
         return 0.0, "field_blind"
     free_m = clearance.ahead_m if linear_m_s > 0.0 else clearance.behind_m
     if free_m < field.stop_m:

@@ -4,18 +4,26 @@ import math
 import threading
 from dataclasses import replace
 
-from hal.field import measure_clearance
-from hal.governor import Governor, State
+import msgspec
+
+from hal.arming import State
+from hal.clock import is_fresh
+from hal.field import Clearance, measure_clearance
+from hal.governor import Governor
 from hal.messages import Applied, Command, LaserScan, Observation, Reason
-from hal.port import Herald, MotorSwitch, Robot
-from hal.profile import RobotProfile
+from hal.port import DeviceHealth, DeviceMonitor, Herald, MotorSwitch, Robot
+from hal.profile import Field, RobotProfile
 
 SLICE_S = 0.05  # the watchdog looks at least this often while the robot's time passes in `wait`
 ROUNDING_S = 1e-9
+FIELD_OFF = "the protective field is off: there is no lidar, so nothing stops the robot before an obstacle"
 
 
 class GovernedRobot:
     """Implements `hal.port.Robot` around a raw one.
+
+    A robot that is to be driven without a lidar has no protective field: `profile` is then without it, and
+    `field_off` says so.
 
     All but `open`, `read`, `wait` and `close` may be called from any thread; the lock they share is never held while a
     sensor is read or time passes, so a watchdog thread that calls `tick` waits for nothing but the base.
@@ -23,7 +31,9 @@ class GovernedRobot:
 
     def __init__(self, robot: Robot) -> None:
         self._robot = robot
-        self._governor = Governor(robot.profile)
+        self._monitor = robot if isinstance(robot, DeviceMonitor) else None
+        self._profile, self.field_off = _without_field(robot.profile, self._health().absent)
+        self._governor = Governor(self._profile)
         self._switch = robot if isinstance(robot, MotorSwitch) else None
         self._cut = False  # the motors' power, by the emergency stop
         self._scan: LaserScan | None = None  # that the field saw last
@@ -31,8 +41,8 @@ class GovernedRobot:
 
     @property
     def profile(self) -> RobotProfile:
-        """The robot's profile."""
-        return self._robot.profile
+        """The robot's profile, as it is driven by."""
+        return self._profile
 
     @property
     def state(self) -> State:
@@ -44,6 +54,11 @@ class GovernedRobot:
         """How many commands were refused, by reason."""
         return dict(self._governor.refused)
 
+    @property
+    def losses(self) -> int:
+        """How often a device was lost."""
+        return self._health().losses
+
     def open(self) -> None:
         """Bring the devices up."""
         self._robot.open()
@@ -51,9 +66,9 @@ class GovernedRobot:
     def read(self) -> Observation:
         """Return the newest of every sensor; the protective field, if there is one, sees the scan."""
         observation = self._robot.read()
-        scan, field = observation.scan, self.profile.field
+        scan, field = observation.scan, self._profile.field
         if field is not None and scan is not None and scan is not self._scan:
-            clearance = measure_clearance(self.profile, field, scan)
+            clearance = self._measure(field, scan)
             with self._lock:
                 self._scan, self._governor.clearance = scan, clearance
         return observation
@@ -117,18 +132,30 @@ class GovernedRobot:
         finally:
             self._robot.close()
 
+    def _measure(self, field: Field, scan: LaserScan) -> Clearance | None:
+        """How free the way is; None for a scan that is not of now. One that is a little ahead counts from now."""
+        now_s = self._robot.now()
+        if not is_fresh(scan.stamp_s, now_s, field.max_age_s):
+            return None
+        return measure_clearance(self._profile, field, replace(scan, stamp_s=min(scan.stamp_s, now_s)))
+
+    def _health(self) -> DeviceHealth:
+        return DeviceHealth() if self._monitor is None else self._monitor.device_health()
+
     def _actuate(self) -> Applied:
+        health = self._health()
+        self._governor.note_devices(health.lost, health.losses)
         allowed = self._governor.tick(self._robot.now())
         # The base times it out by itself, from when it was decided, should nobody come back here.
         decided_s = allowed.stamp_s if math.isnan(allowed.command_age_s) else allowed.stamp_s - allowed.command_age_s
         got = self._robot.drive(Command(allowed.twist, decided_s, allowed.source, allowed.answers))
-        if self._robot.now() - allowed.stamp_s > self.profile.control.robot_timeout_s:
+        if self._robot.now() - allowed.stamp_s > self._profile.control.robot_timeout_s:
             # The base hung on it: what it took in the end is old by now.
             self._governor.halt()
             allowed = self._governor.tick(self._robot.now())
             got = self._robot.drive(Command(allowed.twist, allowed.stamp_s))
         self._switch_motors()
-        # What is allowed may still not happen: a base that lost a device says why it stands.
+        # What is allowed may still not happen: a base that refuses it says why it stands.
         reason = got.reason if allowed.reason is Reason.OK else allowed.reason
         return replace(allowed, twist=got.twist, reason=reason, clamps=allowed.clamps + got.clamps)
 
@@ -138,3 +165,10 @@ class GovernedRobot:
         if self._switch is not None and emergency is not self._cut:
             self._switch.cut_motors(emergency)
             self._cut = emergency
+
+
+def _without_field(profile: RobotProfile, absent: tuple[str, ...]) -> tuple[RobotProfile, str]:
+    """Return the profile to drive by, and why its protective field is off, "" unless it is."""
+    if profile.field is None or "lidar" not in absent:
+        return profile, ""
+    return msgspec.structs.replace(profile, field=None), FIELD_OFF

@@ -1,18 +1,20 @@
 """The governor: what the wheels get, from whom, and why. Pure: no threads, no clock, no bus.
 
-`TRANSITIONS` is the whole state machine. In words: only a neutral command arms, only an armed robot moves, whatever
-goes wrong stops it, the emergency stop holds until it is released, and then a neutral command has to come again.
+`arming.py` has the state machine; here is who is in charge, what counts as which event, and the limits.
 
 Teleop is in charge while its hand is on, else policy. A hand goes off by saying so (`released`); if it goes silent
-instead, the robot stops and policy does not take over. A released hand holds the robot at zero until policy commands,
-and no longer than its time-out.
+instead, the robot stops and policy does not take over. A hand that lets go holds the robot at zero until policy
+commands, and no longer than its time-out, whatever it says after that. A zero of a hand that has let go does nothing.
+
+Outside `ARMED` no command that is still alive carries motion: what was commanded before a stop does not drive after it.
 """
 
 import math
 from collections import Counter
 from dataclasses import replace
-from enum import StrEnum
 
+from hal.arming import TRANSITIONS, Event, State
+from hal.clock import AHEAD_S
 from hal.field import Clearance, limit_speed
 from hal.lease import Lease
 from hal.messages import STOP, Applied, Command, Reason, Source, Twist
@@ -23,68 +25,7 @@ ROUNDING_S = 1e-6  # stamps travel in whole nanoseconds; sums of periods are les
 # The watchdog strikes at the time-out. A command that comes late by less than its own period is obeyed if the watchdog
 # has not struck: without this a stream at exactly the time-out would hang on rounding.
 GRACE_S = 0.02
-# A client's estimate of the robot's clock lags; one that runs this far ahead could keep a late command alive.
-AHEAD_S = 0.1
 RAMP_S = 0.05  # the speed limit never rises by more than this much time's worth at once, however long nobody looked
-
-
-class State(StrEnum):
-    """Whether motion is allowed."""
-
-    DISARMED = "disarmed"  # nobody has commanded, or the commander left
-    ARMED = "armed"
-    STOPPED = "stopped"  # something went wrong
-    EMERGENCY = "emergency"  # somebody pressed the emergency stop
-
-
-class Event(StrEnum):
-    """What can happen to the governor."""
-
-    NEUTRAL = "neutral"  # who is in charge commands zero
-    MOTION = "motion"  # who is in charge commands motion
-    EXPIRED = "expired"  # who was in charge went silent
-    BROKEN = "broken"  # a command that is not finite
-    IGNORED = "ignored"  # a command that came late, out of order or from somebody else
-    HALTED = "halted"  # the robot is being shut down, or the commander left
-    PRESSED = "pressed"  # the emergency stop
-    RELEASED = "released"  # the emergency stop
-
-
-_D, _A, _S, _E = State.DISARMED, State.ARMED, State.STOPPED, State.EMERGENCY
-TRANSITIONS: dict[tuple[State, Event], tuple[State, Reason]] = {
-    (_D, Event.NEUTRAL): (_A, Reason.OK),
-    (_D, Event.MOTION): (_D, Reason.NEUTRAL_FIRST),
-    (_D, Event.EXPIRED): (_D, Reason.STALE),
-    (_D, Event.BROKEN): (_D, Reason.REFUSED),
-    (_D, Event.IGNORED): (_D, Reason.REFUSED),
-    (_D, Event.HALTED): (_D, Reason.NO_COMMAND),
-    (_D, Event.PRESSED): (_E, Reason.ESTOP),
-    (_D, Event.RELEASED): (_D, Reason.NEUTRAL_FIRST),
-    (_A, Event.NEUTRAL): (_A, Reason.OK),
-    (_A, Event.MOTION): (_A, Reason.OK),
-    (_A, Event.EXPIRED): (_S, Reason.STALE),
-    (_A, Event.BROKEN): (_S, Reason.REFUSED),
-    (_A, Event.IGNORED): (_A, Reason.OK),
-    (_A, Event.HALTED): (_D, Reason.NO_COMMAND),
-    (_A, Event.PRESSED): (_E, Reason.ESTOP),
-    (_A, Event.RELEASED): (_A, Reason.OK),
-    (_S, Event.NEUTRAL): (_A, Reason.OK),
-    (_S, Event.MOTION): (_S, Reason.NEUTRAL_FIRST),
-    (_S, Event.EXPIRED): (_S, Reason.STALE),
-    (_S, Event.BROKEN): (_S, Reason.REFUSED),
-    (_S, Event.IGNORED): (_S, Reason.REFUSED),
-    (_S, Event.HALTED): (_D, Reason.NO_COMMAND),
-    (_S, Event.PRESSED): (_E, Reason.ESTOP),
-    (_S, Event.RELEASED): (_S, Reason.NEUTRAL_FIRST),
-    (_E, Event.NEUTRAL): (_E, Reason.ESTOP),
-    (_E, Event.MOTION): (_E, Reason.ESTOP),
-    (_E, Event.EXPIRED): (_E, Reason.ESTOP),
-    (_E, Event.BROKEN): (_E, Reason.ESTOP),
-    (_E, Event.IGNORED): (_E, Reason.ESTOP),
-    (_E, Event.HALTED): (_E, Reason.ESTOP),
-    (_E, Event.PRESSED): (_E, Reason.ESTOP),
-    (_E, Event.RELEASED): (_S, Reason.NEUTRAL_FIRST),
-}
 
 
 class Governor:
@@ -102,7 +43,11 @@ class Governor:
         self._timeouts_s = {Source.TELEOP: control.teleop_timeout_s, Source.POLICY: control.policy_timeout_s}
         self._leases = {source: Lease(control.lease_s) for source in self._timeouts_s}
         self._live: dict[Source, Command] = {}
-        self._newest_s: dict[Source, float] = {}
+        self._newest: dict[Source, Command] = {}  # as it was stamped: what came before it from there is out of order
+        self._not_before_s = -math.inf  # what was sent before the emergency stop was released does not count
+        self._cut_off: int | None = None  # the hand (its epoch) that moved at the stop or since, until it is at zero
+        self._lost: tuple[str, ...] = ()
+        self._losses = 0
         self._state, self._reason = State.DISARMED, Reason.NO_COMMAND
         self._last, self._last_s = STOP, -math.inf
         self.clearance: Clearance | None = None
@@ -121,10 +66,10 @@ class Governor:
             self._fire(Event.IGNORED)
         elif not _is_finite(command.twist):
             self.refused["not finite"] += 1
-            self._live.pop(command.source, None)
             # A broken policy does not take the wheel out of a person's hand.
-            if not self._hand_on():
+            if command.source is Source.TELEOP or not self._hand_on():
                 self._fire(Event.BROKEN)
+            self._live.pop(command.source, None)
         else:
             self._accept(command, now_s)
 
@@ -133,7 +78,7 @@ class Governor:
         self._expire(now_s, -ROUNDING_S)
         command = self._in_charge()
         twist, source, reason = STOP, Source.NONE, self._reason
-        clamps: tuple[str, ...] = ()
+        clamps = tuple(f"no_{name}" for name in self._lost)
         if self._state is State.ARMED and command is not None:
             source = command.source
             twist, clamps = self._limit(command.twist, now_s)
@@ -145,24 +90,37 @@ class Governor:
         age_s = now_s - command.stamp_s
         return Applied(twist, now_s, source, reason, clamps, command.answers, age_s, command.epoch, command.seq)
 
+    def note_devices(self, lost: tuple[str, ...], losses: int) -> None:
+        """Take in which devices are lost now, and how many losses there ever were: one between two looks counts too."""
+        missed = losses > self._losses
+        if lost or missed:
+            self._fire(Event.LOST)
+        if not lost and (missed or self._lost):
+            self._fire(Event.FOUND)
+        self._lost, self._losses = lost, losses
+
     def halt(self) -> None:
         """Stop and forget every command."""
-        self._live.clear()
         self._fire(Event.HALTED)
+        self._live.clear()
 
     def press(self) -> None:
-        """Stop until `release`, and forget every command."""
-        self._live.clear()
+        """Stop until `release`."""
         self._fire(Event.PRESSED)
 
     def release(self, now_s: float) -> None:
         """Let go of the emergency stop. What was commanded before does not count any more."""
-        self._live.clear()
-        self._newest_s = dict.fromkeys(self._timeouts_s, now_s)
+        self._not_before_s = now_s
         self._fire(Event.RELEASED)
 
     def _fire(self, event: Event) -> None:
         self._state, self._reason = TRANSITIONS[self._state, event]
+        if self._state is State.ARMED:
+            return
+        hand = self._live.get(Source.TELEOP)
+        if hand is not None and not is_neutral(hand.twist):
+            self._cut_off = hand.epoch
+        self._live = {source: replace(command, twist=STOP) for source, command in self._live.items()}
 
     def _objection(self, command: Command, now_s: float) -> str | None:
         timeout_s = self._timeouts_s.get(command.source)
@@ -172,43 +130,59 @@ class Governor:
             return "no time"
         if command.stamp_s > now_s + AHEAD_S:
             return "from the future"
-        if command.stamp_s < self._newest_s.get(command.source, -math.inf):
+        newest = self._newest.get(command.source)
+        # One commander's clock, which may run ahead, does not put another's commands out of order.
+        in_order = newest is None or newest.epoch != command.epoch or command.stamp_s >= newest.stamp_s
+        if not in_order or command.stamp_s < self._not_before_s:
             return "out of order"
         if now_s - command.stamp_s >= timeout_s - ROUNDING_S:
             return "late"
         return self._leases[command.source].objection(command.epoch, now_s)
 
     def _accept(self, command: Command, now_s: float) -> None:
-        source, lease = command.source, self._leases[command.source]
-        self._newest_s[source] = command.stamp_s
-        lease.renew(command.epoch, now_s)
         twist = STOP if command.released else command.twist
-        command = replace(command, twist=twist, stamp_s=min(command.stamp_s, now_s))
-        self._live[source] = command
-        if self._in_charge() is command:
-            self._fire(Event.NEUTRAL if is_neutral(twist) else Event.MOTION)
+        taken = replace(command, twist=twist, stamp_s=min(command.stamp_s, now_s))
+        if command.source is Source.TELEOP and is_neutral(twist) and command.epoch == self._cut_off:
+            self._cut_off = None
         if command.released:
-            lease.release()
-            if source is Source.POLICY:
-                self._leave()
+            self._let_go(command, taken)
+            return
+        self._newest[command.source] = command
+        self._leases[command.source].renew(command.epoch, now_s)
+        self._live[command.source] = taken
+        if self._in_charge() is taken:
+            self._fire(self._event_of(taken))
 
-    def _leave(self) -> None:
-        """Policy is gone; a person's hand stays."""
-        del self._live[Source.POLICY]
-        if not self._live:
-            self._fire(Event.HALTED)
+    def _event_of(self, command: Command) -> Event:
+        """What it means that who is in charge commands this."""
+        if is_neutral(command.twist):
+            return Event.NEUTRAL
+        cut_off = command.source is Source.TELEOP and command.epoch == self._cut_off
+        return Event.RESUMED if cut_off else Event.MOTION
+
+    def _let_go(self, command: Command, taken: Command) -> None:
+        """Policy or a hand leaves the wheel to others. A hand that had left it before says nothing new."""
+        self._leases[command.source].release()
+        if command.source is Source.POLICY:
+            self._newest[Source.POLICY] = command
+            self._live.pop(Source.POLICY, None)
+            if not self._hand_on():
+                self._fire(Event.HALTED)
+        elif self._hand_on():
+            self._newest[Source.TELEOP] = command
+            self._live[Source.TELEOP] = taken
 
     def _expire(self, now_s: float, grace_s: float) -> None:
-        """Drop what is older than its time-out. Stop if that was a hand that did not let go, or the last one."""
-        stop = False
-        for source, timeout_s in self._timeouts_s.items():
-            command = self._live.get(source)
-            if command is None or now_s - command.stamp_s < timeout_s + grace_s:
-                continue
-            del self._live[source]
-            stop |= not self._live or (source is Source.TELEOP and not command.released)
-        if stop:
+        """Drop what is older than its time-out. It stops the robot if that was in charge."""
+        old = [
+            command
+            for command in self._live.values()
+            if now_s - command.stamp_s >= self._timeouts_s[command.source] + grace_s
+        ]
+        if self._in_charge() in old:
             self._fire(Event.EXPIRED)
+        for command in old:
+            del self._live[command.source]
 
     def _in_charge(self) -> Command | None:
         teleop, policy = self._live.get(Source.TELEOP), self._live.get(Source.POLICY)

@@ -48,7 +48,7 @@ class Reason(StrEnum):
 
     OK = "ok"
     NO_COMMAND = "no_command"  # nothing has been commanded yet
-    STALE = "stale"  # the newest command is older than its time-out
+    STALE = "stale"  # the newest command is older than its time-out, or a device is lost: `clamps` names it
     NEUTRAL_FIRST = "neutral_first"  # stopped or just started: a neutral command has to come first
     REFUSED = "refused"  # the newest command was refused (non-finite, out of order)
     OBSTACLE = "obstacle"  # something is in the way, or the lidar does not say

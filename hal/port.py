@@ -1,5 +1,6 @@
 """The port that every robot fits: physical, twin, remote, null. The code that drives one drives them all."""
 
+from dataclasses import dataclass
 from typing import Protocol, runtime_checkable
 
 from hal.messages import Applied, Command, CourseState, Episode, Observation
@@ -50,6 +51,31 @@ class Herald(Protocol):
 
     def wait_news(self, until_s: float) -> None:
         """Let the robot's time pass until there is something new to `read`, and until `until_s` at most."""
+
+
+@dataclass(frozen=True, slots=True)
+class DeviceHealth:
+    """What a robot says about the devices that it needs in order to move.
+
+    `lost` names those that do not work now; `losses` counts every loss there ever was and never falls, so that one too
+    short to be seen, or a board that had to be negotiated with anew, is not missed. `absent` names what the robot is to
+    be driven without.
+    """
+
+    lost: tuple[str, ...] = ()
+    losses: int = 0
+    absent: tuple[str, ...] = ()
+
+
+@runtime_checkable
+class DeviceMonitor(Protocol):
+    """What a robot may have beside the port: it says which of its devices are lost.
+
+    Whoever governs it stops it then; the robot itself passes on what it is told to drive.
+    """
+
+    def device_health(self) -> DeviceHealth:
+        """How the devices are now. Returns at once; may be called from any thread."""
 
 
 class Arena(Protocol):

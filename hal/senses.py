@@ -2,7 +2,8 @@
 
 from typing import Any, Generic, Protocol, TypeVar
 
-from hal.bus import Bus
+from hal.bus import Bus, Received
+from hal.clock import AHEAD_S, is_fresh
 from hal.messages import Observation
 from hal.topics import BATTERY, CAMERA, IMU, ODOM, RANGES, SCAN, Topic
 
@@ -25,6 +26,8 @@ class Sense(Generic[S]):
         self._max_age_s = topic.max_age_s
         self._reader = bus.reader(topic)
         self._not_before_s = float("-inf")
+        self._judged: Received[S] | None = None  # the newest, and whether it came with an honest stamp
+        self._honest = False
         self.seq = -1  # the observation that the newest value belongs to
 
     def forget(self, before_s: float) -> None:
@@ -36,8 +39,10 @@ class Sense(Generic[S]):
         newest = self._reader.newest()
         if newest is None or newest.message.stamp_s < self._not_before_s:
             return None
-        # Far ahead is no better than far behind: it was captured before the robot's clock started anew.
-        if abs(now_s - newest.message.stamp_s) > self._max_age_s:
+        if newest is not self._judged:
+            # One from ahead does not become fresh by waiting.
+            self._judged, self._honest = newest, newest.message.stamp_s <= now_s + AHEAD_S
+        if not self._honest or not is_fresh(newest.message.stamp_s, now_s, self._max_age_s):
             return None
         if newest.attachment is not None:
             self.seq = newest.attachment.seq

@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from hal.messages import LaserScan
 from hal.profile import Base
+from hal.ranges import read_ranges
 
 CONE_RAD = math.radians(10.0)  # to each side of straight ahead: what fills it has to be one wall
 SEEN = 0.8  # share of the beams in the cone that must say something
@@ -71,7 +72,8 @@ def turn_between(before: LaserScan, after: LaserScan, expected_rad: float, windo
 def _beams(scan: LaserScan) -> tuple[Floats, Floats]:
     """Bearings in [-pi, pi) and ranges; what is too close counts as at the shortest range."""
     angles: Floats = scan.angle_min + scan.angle_increment * np.arange(len(scan.ranges), dtype=np.float64)
-    ranges = np.where(np.isneginf(scan.ranges), scan.range_min, scan.ranges).astype(np.float64)
+    ranges: Floats = read_ranges(scan).astype(np.float64)
+    ranges[np.isneginf(ranges)] = scan.range_min
     return np.remainder(angles + math.pi, math.tau) - math.pi, ranges
 
 

@@ -1,4 +1,4 @@
-"""The physical ROSbot 2.0: lidar, camera and base as one robot that stands while any of them is lost."""
+"""The physical ROSbot 2.0: lidar, camera and base as one robot, which says when one of them is lost."""
 
 import threading
 import time
@@ -6,15 +6,16 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, TypeVar
 
+from hal.clock import is_fresh
 from hal.errors import ConfigError, DeviceError
 from hal.messages import STOP, Applied, Command, DepthImage, LaserScan, Observation, Reason, Source
+from hal.port import DeviceHealth
 from hal.profile import RobotProfile
 from hal.senses import Stamped
 from hal.topics import BATTERY, CAMERA, DEPTH, IMU, ODOM, RANGES, SCAN, Topic
 from robot.camera.device import CameraDevice
 from robot.camera.source import Picture
 from robot.core2.device import Core2
-from robot.interlock import Interlock
 from robot.keeper import Keeper
 from robot.rplidar.device import RPLidar
 from robot.settings import Settings
@@ -37,10 +38,9 @@ class Devices:
 
 
 class Rosbot:
-    """Implements `hal.port.Robot`, `MotorSwitch` and `Herald`. Its clock is the monotonic clock.
+    """Implements `hal.port.Robot`, `MotorSwitch`, `Herald` and `DeviceMonitor`. Its clock is the monotonic clock.
 
-    A device that is lost is opened again by itself; meanwhile, and until the first zero command afterwards, the wheels
-    stand, and `Applied.clamps` says why: "no_lidar", "no_camera", "no_base", "neutral_first".
+    A device that is lost ("lidar", "camera", "base") is opened again by itself; to stand meanwhile is the governor's.
     """
 
     def __init__(self, profile: RobotProfile, devices: Devices) -> None:
@@ -50,7 +50,7 @@ class Rosbot:
         self._depth: DepthImage | None = None
         self._newest: Observation | None = None
         self._news = threading.Event()  # a scan or a picture; the base is read often enough
-        self._interlock = Interlock()
+        self._blind_spells = 0  # how often a scan came later than `BLIND_S` after the one before
         self._open = False
         self.base = Core2(devices.base, devices.settings.base, profile.control.robot_timeout_s)
         self.lidar: RPLidar | None = None
@@ -104,16 +104,21 @@ class Rosbot:
         return self._newest
 
     def drive(self, command: Command) -> Applied:
-        """Send a velocity to the base, or zero if the robot may not move."""
-        twist, reason, clamps = self._interlock.judge(command.twist, self._lost())
+        """Send a velocity to the base, zero if it is not finite."""
+        twist, source, reason = command.twist, command.source, Reason.OK
         try:
             self.base.drive(twist, command.stamp_s)
-        except ValueError:  # not finite
-            twist, reason = STOP, Reason.REFUSED
+        except ValueError:
+            twist, source, reason = STOP, Source.NONE, Reason.REFUSED
             self.base.drive(STOP)
         now_s = self.now()
-        source = command.source if reason is Reason.OK else Source.NONE
-        return Applied(twist, now_s, source, reason, clamps, command.answers, now_s - command.stamp_s)
+        return Applied(twist, now_s, source, reason, (), command.answers, now_s - command.stamp_s)
+
+    def device_health(self) -> DeviceHealth:
+        """What is lost now, how often anything was, and what it has none of."""
+        lost = self._lost()  # before the count: what is lost by now is in it
+        losses = sum(keeper.losses for keeper in self._keepers.values()) + self.base.losses + self._blind_spells
+        return DeviceHealth(lost, losses, tuple(name for name in ("lidar", "camera") if name not in self._keepers))
 
     def now(self) -> float:
         """Seconds on the monotonic clock."""
@@ -141,23 +146,28 @@ class Rosbot:
 
     def troubles(self) -> dict[str, str]:
         """What is wrong with which device, each with its remedy; empty while all work."""
-        return {name.removeprefix("no_"): self._trouble(name.removeprefix("no_")) for name in self._lost()}
+        return {name: self._trouble(name) for name in self._lost()}
 
     def _trouble(self, name: str) -> str:
         failure = self._keepers[name].failure
         return str(failure) if failure is not None else f"the {name} is silent. Check its power and plug."
 
     def _lost(self) -> tuple[str, ...]:
-        """Which devices do not work now, as clamps."""
+        """Which devices do not work now."""
         lost = [name for name, keeper in self._keepers.items() if not keeper.alive]
-        scan = self._scan
-        if "lidar" in self._keepers and "lidar" not in lost and (scan is None or self.now() - scan.stamp_s > BLIND_S):
+        if "lidar" in self._keepers and "lidar" not in lost and self._is_blind():
             lost.append("lidar")
         if not self.base.answers and "base" not in lost:
             lost.append("base")
-        return tuple(f"no_{name}" for name in lost)
+        return tuple(lost)
+
+    def _is_blind(self) -> bool:
+        scan = self._scan
+        return scan is None or not is_fresh(scan.stamp_s, self.now(), BLIND_S)
 
     def _see_scan(self, scan: LaserScan) -> None:
+        if self._scan is not None:
+            self._blind_spells += self._is_blind()
         self._scan = scan
         self._news.set()
 
@@ -171,7 +181,7 @@ class Rosbot:
 
 def fresh_of(value: S | None, topic: Topic[Any], now_s: float) -> S | None:
     """Return the value unless it is older than its topic allows."""
-    return value if value is not None and now_s - value.stamp_s <= topic.max_age_s else None
+    return value if value is not None and is_fresh(value.stamp_s, now_s, topic.max_age_s) else None
 
 
 def same(one: Observation, other: Observation) -> bool:

@@ -134,7 +134,7 @@ class Manoeuvre:
     def _watch(self, seen: Observation, applied: Applied, way: "Way") -> None:
         if "field_blind" in applied.clamps:
             what = "the robot stopped: its protective field does not see the way"
-            raise CalibrationError(what, "Give --lidar, also with --by tape; or look at its cable.")
+            raise CalibrationError(what, "Look at its cable and its window.")
         if applied.reason is not Reason.OK:
             why = WHY.get(applied.reason, "it does not move")
             clamps = f" ({', '.join(applied.clamps)})" if applied.clamps else ""

@@ -7,16 +7,16 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 
 from hal.bus import Bus, Publisher, Reader
-from hal.clock import ClockEstimate
+from hal.clock import ClockEstimate, is_fresh
 from hal.errors import BusError, ConfigError, DeviceError
-from hal.messages import STOP, Applied, Command, Observation, Reason, Source, Twist, TwistStamped
+from hal.messages import STOP, Applied, Command, Observation, Reason, Twist, TwistStamped
+from hal.port import DeviceHealth
 from hal.profile import RobotProfile
 from hal.topics import BATTERY, CAMERA, CMD_VEL, IMU, ODOM, SCAN, SENSOR, Topic
-from robot.interlock import Interlock
 from robot.ros2.forms import placed_scan, plain_picture
 
 SENSED: dict[str, Topic[Any]] = {"scan": SCAN, "camera": CAMERA, "odom": ODOM, "imu": IMU, "battery": BATTERY}
-NEEDED = {"scan": "no_lidar", "camera": "no_camera"}
+NEEDED = {"scan": "lidar", "camera": "camera"}
 CLOCKS = ("scan", "odom", "imu")  # stamped by the robot's computer; a camera may have a clock of its own
 COMMANDED = "cmd_vel"
 BLIND_S = 0.5  # driven on nothing older than this
@@ -52,10 +52,10 @@ class Interface:
 
 
 class Ros2Robot:
-    """Implements `hal.port.Robot` and `Herald`. Its clock is the robot's ROS clock, as its sensors' stamps tell it.
+    """Implements `hal.port.Robot`, `Herald` and `DeviceMonitor`. Its clock is the robot's ROS clock, as stamps tell.
 
     Everything that makes it safe happens on this side. `Applied` says what was sent: what the robot's own stack makes
-    of it, nobody here knows. It stands while the scan or the picture is lost, and until a zero command after that.
+    of it, nobody here knows. Its "lidar" or "camera" is lost while no new scan or picture comes.
     """
 
     def __init__(self, profile: RobotProfile, bus: Bus, interface: Interface) -> None:
@@ -69,7 +69,7 @@ class Ros2Robot:
         self._observation: Observation | None = None
         self._lock = threading.Lock()  # over the clock and what is sent
         self._clock = ClockEstimate()
-        self._interlock = Interlock()
+        self._silences = 0  # how often a topic that is needed was silent, and came back
         self._sent, self._sent_s = STOP, 0.0
 
     @property
@@ -98,7 +98,8 @@ class Ros2Robot:
         now_s = self.now()
         if self._observation is None or news:
             self._seq += 1
-        fresh = {name: value for name, value in self._newest.items() if now_s - value.stamp_s <= SENSED[name].max_age_s}
+        newest = self._newest.items()
+        fresh = {name: value for name, value in newest if is_fresh(value.stamp_s, now_s, SENSED[name].max_age_s)}
         self._observation = Observation(
             self._seq,
             now_s,
@@ -111,15 +112,18 @@ class Ros2Robot:
         return self._observation
 
     def drive(self, command: Command) -> Applied:
-        """Send a velocity, at once if it is new, else at 20 Hz; zero if the robot may not move."""
-        twist, reason, clamps = self._interlock.judge(command.twist, tuple(NEEDED[name] for name in self._silent()))
-        now_s = self.now()
+        """Send a velocity, at once if it is new, else at 20 Hz."""
+        twist, now_s = command.twist, self.now()
         with self._lock:
             due = twist != self._sent or time.monotonic() - self._sent_s >= SEND_S
             if due:
                 self._send(twist, now_s)
-        source = command.source if reason is Reason.OK else Source.NONE
-        return Applied(twist, now_s, source, reason, clamps, command.answers, now_s - command.stamp_s)
+        return Applied(twist, now_s, command.source, Reason.OK, (), command.answers, now_s - command.stamp_s)
+
+    def device_health(self) -> DeviceHealth:
+        """Which of scan and picture are silent now, and how often either was."""
+        lost = tuple(NEEDED[name] for name in self._silent())
+        return DeviceHealth(lost, self._silences)
 
     def now(self) -> float:
         """Seconds on the robot's ROS clock, late by the shortest way of a message; 0 before there was any."""
@@ -165,10 +169,19 @@ class Ros2Robot:
                     value = placed_scan(value, self._interface.lidar_yaw_rad)
                 elif name == "camera":
                     value = plain_picture(value)
-                self._newest[name] = value
+                self._take(name, value)
         return news
+
+    def _take(self, name: str, value: Any) -> None:
+        """Keep what came. Our estimate of the robot's clock lags: nothing was captured later than now."""
+        now_s = self.now()
+        if now_s < value.stamp_s <= now_s + BLIND_S:  # if further ahead, it is stamped by another clock
+            value = replace(value, stamp_s=now_s)
+        if name in NEEDED and name in self._newest:
+            self._silences += name in self._silent()
+        self._newest[name] = value
 
     def _silent(self) -> list[str]:
         now_s = self.now()
         known = ((name, self._newest.get(name)) for name in NEEDED)
-        return [name for name, value in known if value is None or now_s - value.stamp_s > BLIND_S]
+        return [name for name, value in known if value is None or not is_fresh(value.stamp_s, now_s, BLIND_S)]

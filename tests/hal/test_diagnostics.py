@@ -1,10 +1,16 @@
 """What the HAL server says about itself."""
 
+import time
+
 from wiring import joined, new_endpoint, real_time_null, remote, served, wait_for
 
 from hal.bus import Bus
 from hal.diagnostics import NO_DATAGRAMS, PATIENCE_S, WARN, LinkWatch
+from hal.governed import FIELD_OFF
 from hal.messages import STOP, Command
+from hal.null import NullRobot
+from hal.port import DeviceHealth
+from hal.profile import load_profile
 from hal.remote import RemoteRobot
 from hal.topics import CMD_VEL, DIAGNOSTICS
 from tools.relay import Relay
@@ -69,3 +75,22 @@ def test_it_says_that_datagrams_do_not_get_through_and_still_drives(capfd):
             client.close()
             assert bus.close()
     assert capfd.readouterr().err.count("UDP does not get through") == 1
+
+
+class Lidarless(NullRobot):
+    """It is to be driven without a lidar, and has lost its base twice."""
+
+    def device_health(self):
+        return DeviceHealth(losses=2, absent=("lidar",))
+
+
+def test_that_the_field_is_off_without_a_lidar_is_said_once_and_on_diagnostics(capfd):
+    inner = Lidarless(load_profile("rosbot2"), time.monotonic, time.sleep)
+    with served(inner) as robot, joined(robot) as bus:
+        reader = bus.reader(DIAGNOSTICS)
+        wait_for(lambda: status(reader, "governor") is not None)
+        told = status(reader, "governor")
+        assert told.level == WARN
+        assert ("protective field", FIELD_OFF) in told.values
+        assert ("device losses", "2") in told.values
+    assert capfd.readouterr().err.count(FIELD_OFF) == 1

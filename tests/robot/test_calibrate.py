@@ -157,13 +157,13 @@ def test_it_refuses_what_is_not_safe_and_writes_nothing(tmp_path, capsys, monkey
         assert "no --lidar" in refused([*words, "--by", "lidar"], capsys)
         assert "--distance is" in refused([*words, "--distance", "90", "--yes"], capsys)
         assert "of 5.55 m" in refused([*words, *lidar, "--distance", "4"], capsys)
-        assert "does not see the way" in refused([*words, "--yes"], capsys)
+        assert "protective field is off" in refused([*words, "--yes"], capsys)
         room.held = True
         assert "wheels do not turn" in refused([*words, *lidar, "--only", "turn"], capsys)
         monkeypatch.setattr("sim_backend.emulators.core2.VOLTAGE_V", 10.2)
         assert "battery is at 10.2 V" in refused([*words, *lidar], capsys)
         with contextlib.closing(Line(words[3], 525000)):
-            assert "in use" in refused([*words, "--yes"], capsys)
+            assert "in use" in refused([*words, *NO_FIELD, "--yes"], capsys)
     assert (tmp_path / "mine.toml").read_text() == QUICK
     assert room.true == (0.0, 0.0, 0.0)
 

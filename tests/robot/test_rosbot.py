@@ -34,9 +34,17 @@ def opened(bench, folder):
     robot = Rosbot(PROFILE, Devices(str(folder / "core2"), str(folder / "rplidar"), bench.url, settings=QUICK))
     robot.open()
     try:
-        yield robot
+        yield Governed(robot)
     finally:
         robot.close()
+
+
+class Governed(GovernedRobot):
+    """A governed robot that still says what is wrong with it."""
+
+    def __init__(self, robot):
+        super().__init__(robot)
+        self.troubles = robot.troubles
 
 
 def keep(robot, twist, seconds, until=lambda _: False):
@@ -52,6 +60,10 @@ def keep(robot, twist, seconds, until=lambda _: False):
 
 def drives(applied):
     return applied.twist == GO
+
+
+def waits(applied):
+    return applied.reason is Reason.NEUTRAL_FIRST
 
 
 def test_it_drives_the_twin_through_the_wires_and_sees_what_the_twin_sees(tmp_path):
@@ -92,7 +104,7 @@ def test_unplugged_mid_drive_it_stands_and_resumes_after_return_and_a_neutral_co
         if device == "lidar":  # a base without its cable goes on until its firmware's watchdog
             assert bench.twin.state().linear_m_s == 0.0
         wire.plug()
-        applied = keep(robot, GO, 8.0, lambda applied: applied.clamps == ("neutral_first",))
+        applied = keep(robot, GO, 8.0, waits)
         assert (applied.reason, applied.twist) == (Reason.NEUTRAL_FIRST, STOP)
         keep(robot, GO, 0.2)
         assert bench.twin.state().linear_m_s == 0.0
@@ -113,7 +125,7 @@ def test_a_camera_that_goes_mid_drive_stops_it_and_it_resumes_after_its_return_a
         keep(robot, GO, 0.2)
         assert bench.twin.state().linear_m_s == 0.0
         bench.camera = MjpegServer(bench.camera.port)
-        assert keep(robot, GO, 8.0, lambda applied: applied.clamps == ("neutral_first",)).twist == STOP
+        assert keep(robot, GO, 8.0, waits).twist == STOP
         keep(robot, STOP, 0.1)
         assert keep(robot, GO, 1.0, drives).twist == GO
 
@@ -127,7 +139,7 @@ def test_a_lidar_that_fails_mid_drive_stops_it_is_reset_and_it_resumes_after_a_n
         applied = keep(robot, GO, 3.0, lambda applied: applied.twist == STOP)
         assert applied.clamps == ("no_lidar",)
         assert time.monotonic() - failed_s < 0.8  # the last scan may be 0.5 s old
-        assert keep(robot, GO, 10.0, lambda applied: applied.clamps == ("neutral_first",)).twist == STOP
+        assert keep(robot, GO, 10.0, waits).twist == STOP
         assert not bench.lidar.failed
         keep(robot, STOP, 0.1)
         assert keep(robot, GO, 1.0, drives).twist == GO
@@ -139,8 +151,8 @@ def test_a_reset_of_the_board_stops_it_until_the_board_is_back(tmp_path):
         keep(robot, GO, 0.3)
         bench.base.firmware = Firmware(boot_s=1.2)
         bench.base.reset()
-        assert keep(robot, GO, 2.0, lambda applied: bool(applied.clamps)).clamps == ("no_base",)
-        assert keep(robot, GO, 5.0, lambda applied: applied.clamps == ("neutral_first",)).twist == STOP
+        assert "no_base" in keep(robot, GO, 2.0, lambda applied: "no_base" in applied.clamps).clamps
+        assert keep(robot, GO, 5.0, waits).twist == STOP
         keep(robot, GO, 0.2)
         assert bench.twin.state().linear_m_s == 0.0
         assert not bench.base.crashed
@@ -166,11 +178,10 @@ def test_without_commands_the_base_stands_by_itself(tmp_path):
 
 def test_garbage_on_both_lines_does_not_stop_it(tmp_path):
     with wired(tmp_path) as bench, opened(bench, tmp_path) as robot:
-        governed = GovernedRobot(robot)
-        keep(governed, STOP, 0.3)
+        keep(robot, STOP, 0.3)
         for wire in (bench.lidar_wire, bench.base_wire):
             wire.disturb(200)
-        assert keep(governed, GO, 0.6).twist == GO
+        assert keep(robot, GO, 0.6).twist == GO
         assert not bench.base.crashed
 
 

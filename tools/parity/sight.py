@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from fusion.preprocess import gray_image
 from hal.messages import FloatArray, LaserScan
+from hal.ranges import read_ranges
 from tools.parity.record import Recording
 
 Floats = NDArray[np.float64]
@@ -101,9 +102,10 @@ def brightness(recording: Recording) -> float | None:
 
 
 def _finite(scan: LaserScan) -> Floats:
-    ranges = np.where(np.isposinf(scan.ranges), scan.range_max, scan.ranges)
-    finite: Floats = np.where(np.isneginf(ranges), scan.range_min, ranges).astype(np.float64)
-    return finite
+    ranges: Floats = read_ranges(scan).astype(np.float64)
+    ranges[np.isposinf(ranges)] = scan.range_max
+    ranges[np.isneginf(ranges)] = scan.range_min
+    return ranges
 
 
 def _is_whole(bearings: Floats) -> bool:

@@ -66,8 +66,10 @@ def run(args: argparse.Namespace) -> int:
     profile = load_profile(args.profile)
     settings = load_settings(args.settings if args.settings.exists() else None)
     wanted = [name for name in KEYS if args.only in (None, name)]
-    ask_for_consent(args, wanted)
     robot = GovernedRobot(Rosbot(profile, Devices(args.base, args.lidar, settings=settings)))
+    if robot.field_off:
+        raise ConfigError(robot.field_off, "Give --lidar, also with --by tape, or a --profile without [field].")
+    ask_for_consent(args, wanted)
     with ended_like_ctrl_c(), closing(robot):
         robot.open()
         manoeuvre = Manoeuvre(robot, Pace())

@@ -1,0 +1,19 @@
+"""What a client takes for fresh."""
+
+from types import SimpleNamespace
+
+import pytest
+
+from hal.bus import Received
+from hal.messages import Odometry
+from hal.senses import Sense
+from hal.topics import ODOM
+
+
+@pytest.mark.parametrize(("ahead_s", "until_s"), [(-0.1, 0.2), (0.0, 0.3), (0.09, 0.39), (0.15, None), (0.3, None)])
+def test_a_value_from_the_future_is_not_fresh_for_longer_nor_later(ahead_s, until_s):
+    odom = Odometry(100.0 + ahead_s, 0.0, 0.0, 0.0, 0.0, 0.0)
+    received = Received(odom, None, 0.0)
+    sense = Sense(SimpleNamespace(reader=lambda _: SimpleNamespace(newest=lambda: received)), ODOM)
+    fresh = [step / 100 for step in range(100) if sense.read(100.0 + step / 100) is odom]
+    assert fresh == ([] if until_s is None else [step / 100 for step in range(round(until_s * 100) + 1)])
