@@ -180,24 +180,34 @@ class Questions:
         self._key = key
         self._boundary = boundary
 
-    def serve(self, answer: Callable[[Question], None]) -> None:
-        """Have `answer` answer or refuse what was asked since the last time, `QUESTIONS` at most.
+    def serve(
+        self, answer: Callable[[Question], None], most: int = QUESTIONS, prepare: Callable[[], None] = lambda: None
+    ) -> None:
+        """Have `answer` answer or refuse what was asked since the last time, `most` at most; `prepare` comes before.
 
-        Whatever goes wrong with one is that one's refusal.
+        Whatever goes wrong with one is that one's refusal. What `prepare` raises is passed on.
         """
-        for _ in range(QUESTIONS):
-            if (query := self._next()) is None:
-                return
-            if query.payload is not None and len(query.payload) > QUESTION_BYTES:
-                self._boundary.refuse(self._key, "too long")
-                continue
+        asked = self._take(most)
+        if asked:
+            prepare()
+        for question in asked:
             with self._boundary.guard(self._key):
-                question = Question(query)
                 try:
                     answer(question)
                 finally:
                     if not question.answered:
                         question.refuse("it could not be done")
+
+    def _take(self, most: int) -> list[Question]:
+        asked: list[Question] = []
+        for _ in range(most):
+            if (query := self._next()) is None:
+                break
+            if query.payload is not None and len(query.payload) > QUESTION_BYTES:
+                self._boundary.refuse(self._key, "too long")
+            else:
+                asked.append(Question(query))
+        return asked
 
     def _next(self) -> zenoh.Query | None:
         try:

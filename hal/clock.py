@@ -4,18 +4,23 @@ from collections import deque
 
 # Long enough for one prompt message among late ones, short enough to follow a robot whose time runs slower.
 WINDOW_S = 0.25
+LEAP_S = 0.5  # a clock that runs as ours or slower never leaps; a link that was slow from the first on gains no more
+HEAL_S = 1.0  # if nothing else is heard for so long, it was no mistake: the robot's clock was set
 
 
 class ClockEstimate:
     """Pure: every time comes in as an argument, `local_s` on this machine's monotonic clock.
 
     The most prompt message of the last moments sets the offset, so the estimate is late by the shortest delay and a
-    command stamped with it never looks younger than it is. It never runs back.
+    command stamped with it never looks younger than it is. It never runs back, so a time that leaps ahead of all before
+    is not taken at once: one such message would hold the estimate for ever.
     """
 
     def __init__(self) -> None:
         self._offsets: deque[tuple[float, float]] = deque()
         self._latest_s = float("-inf")
+        self._highest_s = float("inf")  # offset ever since the start
+        self._believed_s = float("-inf")
 
     @property
     def known(self) -> bool:
@@ -24,14 +29,21 @@ class ClockEstimate:
 
     def note(self, sent_s: float, local_s: float) -> None:
         """A message that the robot sent at `sent_s` came at `local_s`."""
-        self._offsets.append((local_s, sent_s - local_s))
+        offset_s = sent_s - local_s
+        if offset_s > self._highest_s + LEAP_S:
+            if local_s - self._believed_s < HEAL_S:
+                return
+            self.restart()
+        self._believed_s = local_s
+        self._highest_s = offset_s if self._highest_s == float("inf") else max(self._highest_s, offset_s)
+        self._offsets.append((local_s, offset_s))
         while self._offsets[0][0] < local_s - WINDOW_S:
             self._offsets.popleft()
 
     def restart(self) -> None:
         """Forget all: the robot was started anew and its clock with it."""
         self._offsets.clear()
-        self._latest_s = float("-inf")
+        self._latest_s, self._highest_s = float("-inf"), float("inf")
 
     def now(self, local_s: float) -> float:
         """Seconds on the robot's clock at `local_s`; only when `known`."""

@@ -16,6 +16,7 @@ from hal.topics import INFO, RESET
 
 REALTIME: Literal["realtime"] = "realtime"
 LOCKSTEP: Literal["lockstep"] = "lockstep"
+RESETS = 1  # at a time
 
 Token = Annotated[int, msgspec.Meta(ge=0)]  # msgspec keeps integers within 64 bits
 Moment = Annotated[float, msgspec.Meta(ge=-LARGEST, le=LARGEST)]
@@ -66,14 +67,11 @@ class Desk:
         self._reset_asked = None if arena is None else bus.questions(RESET)
 
     def serve(self, show: Callable[[], None]) -> None:
-        """Answer what was asked since the last time, and call `show` before each answer.
+        """Answer what was asked since the last time, and call `show` before the answers.
 
-        `show` publishes the robot's newest observation, so that whoever asks has it when the answer comes.
+        `show` publishes the robot's newest observation, so that whoever asks has it when the answer comes. Many who
+        ask cost the robot one, and one new start at a time.
         """
-
-        def answer_info(question: Question) -> None:
-            show()
-            question.answer(self._info)
 
         def answer_reset(question: Question) -> None:
             reset_s = self._now()
@@ -83,9 +81,9 @@ class Desk:
                 show()
                 question.answer(msgspec.json.encode(reset_s))
 
-        self._info_asked.serve(answer_info)
+        self._info_asked.serve(lambda question: question.answer(self._info), prepare=show)
         if self._reset_asked is not None:
-            self._reset_asked.serve(answer_reset)
+            self._reset_asked.serve(answer_reset, most=RESETS)
 
     def _reset(self, payload: bytes) -> str | None:
         """Start the episode; returns why not."""

@@ -38,7 +38,9 @@ class Scene:
         return self._start(["peer.py", "drive", self.name, self.endpoint, str(log)], "drives"), log
 
     def attacker(self, how, size, keys):
-        return self._start(["peer.py", how, self.name, self.endpoint, str(size), *keys], {"ask": "asks"}.get(how, "floods"))
+        return self._start(
+            ["peer.py", how, self.name, self.endpoint, str(size), *keys], {"ask": "asks"}.get(how, "floods")
+        )
 
     def _start(self, words, ready):
         self._count += 1
