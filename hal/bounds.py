@@ -10,7 +10,7 @@ from typing import Any
 
 from hal.messages import Imu, LaserScan, Odometry, Twist
 
-LARGEST = 1e9  # of any number in SI units
+LARGEST = 1e10  # of any number in SI units: a time since 1970 fits
 LONGEST_TEXT = 4096
 MOST_ITEMS = 1024
 MOST_BEAMS = 16_384
