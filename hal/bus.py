@@ -3,11 +3,12 @@
 Every message carries an attachment. Nothing here calls back: readers are polled, so no topic can stall another.
 """
 
+import itertools
 import re
 import secrets
 import time
 from collections import Counter
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from typing import Any, Generic, TypeVar
 
@@ -52,7 +53,13 @@ class Publisher(Generic[M]):
     """Publishes one topic."""
 
     def __init__(
-        self, connection: Connection, declare: Callable[[zenoh.Session], Any], epoch: int, *, latched: bool
+        self,
+        connection: Connection,
+        declare: Callable[[zenoh.Session], Any],
+        epoch: int,
+        count: Iterator[int],
+        *,
+        latched: bool,
     ) -> None:
         self._connection = connection
         self._declare = declare
@@ -60,7 +67,7 @@ class Publisher(Generic[M]):
         self._kept: tuple[bytes, bytes] | None = None
         self._publisher = connection.declare(self._anew)
         self._epoch = epoch
-        self._seq = 0
+        self._count = count
 
     @property
     def matching(self) -> bool:
@@ -70,13 +77,13 @@ class Publisher(Generic[M]):
     def put(
         self, message: M, time_s: float, *, seq: int | None = None, answers: int = -1, released: bool = False
     ) -> None:
-        """Send a message at `time_s` on the robot's clock; `seq` is its own count unless given.
+        """Send a message at `time_s` on the robot's clock; `seq` is the bus's count on this key unless given.
 
         Raises `BusError` when the session is closed, `CodecError` for what ROS cannot hold.
         """
-        self._seq = self._seq + 1 if seq is None else seq
         payload = encode(message)
-        attachment = Attachment(self._epoch, self._seq, round(time_s * 1e9), answers, released).to_bytes()
+        number = next(self._count) if seq is None else seq
+        attachment = Attachment(self._epoch, number, round(time_s * 1e9), answers, released).to_bytes()
         if self._latched:
             self._kept = payload, attachment
         try:
@@ -256,6 +263,7 @@ class Bus:
         self.epoch = secrets.randbits(64)
         self.refusals = refusals or Refusals()
         self.boundary = Boundary()
+        self._counts: dict[str, Iterator[int]] = {}  # what was sent, by key: they grow whoever sends
         keys = keys or keys_from_environment()
         self.encrypted = keys is not None
         for endpoint in (listen, connect):
@@ -293,7 +301,8 @@ class Bus:
             cache = ext.CacheConfig(max_samples=1)
             return ext.declare_advanced_publisher(session, key, cache=cache, publisher_detection=True, **options)
 
-        return Publisher(self._connection, declare, self.epoch, latched=qos.latched)
+        count = self._counts.setdefault(key, itertools.count(1))
+        return Publisher(self._connection, declare, self.epoch, count, latched=qos.latched)
 
     def put_raw(self, topic: Topic[Any], payload: bytes, attachment: bytes | None = None) -> None:
         """Send bytes as they are: for relays, recorders and tests of what a bus has to bear."""

@@ -19,7 +19,13 @@ CONNECT_MS = 3000
 
 
 def open_session(
-    robot: str, listen: str | None, connect: str | None, keys: Keys | None, *, prefix: str, watch: bool = False
+    robot: str,
+    listen: str | None,
+    connect: str | None,
+    keys: Keys | None,
+    *,
+    prefix: str | None = None,
+    watch: bool = False,
 ) -> zenoh.Session:
     """Open one; the arguments are those of `hal.bus.Bus`. With neither address it is connected to nobody.
 
@@ -47,7 +53,7 @@ def open_session(
         "transport/unicast/accept_timeout": OPEN_MS,
         "transport/link/tx/lease": LEASE_MS,
         "transport/link/rx/max_message_size": MESSAGE_BYTES,
-        "low_pass_filter": _size_limits(prefix),
+        "low_pass_filter": _size_limits(robot if prefix is None else prefix),
         # It can lose a message when a receiver stalls.
         "transport/shared_memory/enabled": False,
         # Late readers of a latched topic are served by its time stamp.
