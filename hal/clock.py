@@ -5,6 +5,9 @@ from collections import deque
 # Long enough for one prompt message among late ones, short enough to follow a robot whose time runs slower.
 WINDOW_S = 0.25
 LEAP_S = 0.5  # a clock that runs as ours or slower never leaps; a link that was slow from the first on gains no more
+# So long a robot is silent before another of its name is listened to: one that was started anew, and nobody who speaks
+# between its words. Both take longer to come up.
+SILENT_S = 0.3
 HEAL_S = 1.0  # if nothing else is heard for so long, it was no mistake: the robot's clock was set
 
 
@@ -21,11 +24,27 @@ class ClockEstimate:
         self._latest_s = float("-inf")
         self._highest_s = float("inf")  # offset ever since the start
         self._believed_s = float("-inf")
+        self._epoch: int | None = None  # of the robot that is listened to
+        self._heard_s = float("-inf")
 
     @property
     def known(self) -> bool:
         """Whether the robot was ever heard."""
         return bool(self._offsets)
+
+    def hear(self, epoch: int, sent_s: float, local_s: float) -> bool:
+        """As `note`, for a message that names its sender's session. False if it is not of the robot listened to.
+
+        A robot that was started anew has another session, and another clock.
+        """
+        if epoch != self._epoch:
+            if local_s - self._heard_s < SILENT_S:
+                return False
+            self._epoch = epoch
+            self.restart()
+        self._heard_s = local_s
+        self.note(sent_s, local_s)
+        return True
 
     def note(self, sent_s: float, local_s: float) -> None:
         """A message that the robot sent at `sent_s` came at `local_s`."""

@@ -4,7 +4,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from hal.clock import HEAL_S, LEAP_S, WINDOW_S, ClockEstimate
+from hal.clock import HEAL_S, LEAP_S, SILENT_S, WINDOW_S, ClockEstimate
 
 
 def test_the_most_prompt_message_counts():
@@ -92,3 +92,21 @@ def test_what_was_held_back_for_seconds_and_what_follows_it_are_followed():
         clock.note(100.0 + 0.05 * step, 13.0)  # three seconds' messages in one burst
     clock.note(103.0, 13.0)
     assert clock.now(13.0) == pytest.approx(103.0)
+
+
+def test_who_speaks_between_a_robots_words_is_not_the_robot():
+    clock = ClockEstimate()
+    for step in range(40):
+        local_s = 10.0 + 0.05 * step
+        assert clock.hear(1, local_s + 100.0, local_s)
+        assert not clock.hear(2 + step, 1e6, local_s + 0.01)
+        assert clock.now(local_s) == pytest.approx(local_s + 100.0)
+
+
+def test_a_robot_that_was_silent_and_has_another_session_was_started_anew():
+    clock = ClockEstimate()
+    assert clock.hear(1, 1000.0, 10.0)
+    assert clock.now(10.0) == 1000.0
+    assert not clock.hear(2, 1.0, 10.0 + SILENT_S - 0.01)
+    assert clock.hear(2, 1.0, 10.0 + SILENT_S)
+    assert clock.now(10.0 + SILENT_S) == 1.0
