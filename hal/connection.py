@@ -101,7 +101,10 @@ class Connection:
                 self._closed.wait(RETRY_S)
                 continue
             events = session.info.declare_link_events_listener(RingChannel(EVENTS))
-            self._replace(session)
+            if not self._replace(session):
+                self._replace(self._idle())
+                self._closed.wait(RETRY_S)
+                continue
             self._up.set()
             while not self._closed.wait(LOOK_S):
                 if _lost_a_link(events) and not self.closed:
@@ -109,15 +112,34 @@ class Connection:
                         self._replace(self._idle())
                     break
 
-    def _replace(self, session: zenoh.Session) -> None:
+    def _replace(self, session: zenoh.Session) -> bool:
+        """Go on with another session; returns whether all that was declared is declared on it.
+
+        To declare can take as long as a link that hangs, so nobody who declares or closes has to wait for it.
+        """
         with self._lock:
-            if not self._closed.is_set():
-                before, self.session = self.session, session
-                for declared in self._declared:
-                    declared.move(session)
-                self._begin(_let_go, before)  # which may take long while links are dead
-                return
-        _let_go(session)
+            closed = self._closed.is_set()
+            before, self.session = self.session, self.session if closed else session
+            declared = list(self._declared)
+        if closed:
+            _let_go(session)
+            return False
+        try:
+            for each in declared:
+                each.move(session)
+        except zenoh.ZError:
+            return False  # it died already, or was closed meanwhile
+        finally:
+            self._leave(before)
+        return True
+
+    def _leave(self, session: zenoh.Session) -> None:
+        """Close a session, which may take long while links are dead: beside, unless `close` waits for it here."""
+        with self._lock:
+            if beside := not self._closed.is_set():
+                self._begin(_let_go, session)
+        if not beside:
+            _let_go(session)
 
 
 def _lost_a_link(events: Any) -> bool:

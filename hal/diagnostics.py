@@ -7,7 +7,6 @@ import time
 from hal.arming import State
 from hal.bus import Bus
 from hal.governed import GovernedRobot
-from hal.inlet import Inlet
 from hal.messages import DiagnosticArray, DiagnosticStatus
 from hal.refusals import LINK
 from hal.topics import DIAGNOSTICS
@@ -37,10 +36,9 @@ class LinkWatch:
 class Reporter:
     """Publishes the diagnostics, and prints what is new and wrong to standard error."""
 
-    def __init__(self, robot: GovernedRobot, bus: Bus, inlet: Inlet) -> None:
+    def __init__(self, robot: GovernedRobot, bus: Bus) -> None:
         self._robot = robot
         self._bus = bus
-        self._inlet = inlet
         self._watch = LinkWatch()
         self._publisher = bus.publisher(DIAGNOSTICS)
         self._said = ""
@@ -68,7 +66,8 @@ class Reporter:
 
     def _governor(self) -> DiagnosticStatus:
         state = self._robot.state
-        counts = self._robot.refused | {"undecodable": self._inlet.dropped}
+        at_the_door = {f"{key}: {reason}": count for (key, reason), count in self._bus.boundary.counts.items()}
+        counts = self._robot.refused | at_the_door
         values = tuple((f"refused: {reason}", str(count)) for reason, count in sorted(counts.items()))
         values += (("device losses", str(self._robot.losses)),)
         if self._robot.field_off:

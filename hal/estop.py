@@ -8,7 +8,7 @@ import threading
 
 import msgspec
 
-from hal.bus import Bus
+from hal.bus import Bus, Question
 from hal.errors import BusError
 from hal.governed import GovernedRobot
 from hal.topics import ESTOP_QUERY
@@ -44,15 +44,17 @@ class EstopDesk:
 
     def serve(self) -> None:
         """Do and answer what was asked since the last time."""
-        while (question := self._asked()) is not None:
-            if question.payload == PRESS:
-                self._robot.press_estop()
-            elif question.payload == RELEASE:
-                self._robot.release_estop()
-            elif question.payload != LOOK:
-                question.refuse(f"say {PRESS.decode()} or {RELEASE.decode()}, or nothing to look")
-                continue
-            question.answer(msgspec.json.encode(EstopState(self._robot.state, self._robot.refused)))
+        self._asked.serve(self._answer)
+
+    def _answer(self, question: Question) -> None:
+        if question.payload == PRESS:
+            self._robot.press_estop()
+        elif question.payload == RELEASE:
+            self._robot.release_estop()
+        elif question.payload != LOOK:
+            question.refuse(f"say {PRESS.decode()} or {RELEASE.decode()}, or nothing to look")
+            return
+        question.answer(msgspec.json.encode(EstopState(self._robot.state, self._robot.refused)))
 
 
 def press_estop(bus: Bus, timeout_s: float = ANSWER_S) -> EstopState:

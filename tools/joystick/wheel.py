@@ -66,7 +66,6 @@ class Wheel:
         self.paused = False
         self.experts: tuple[str, ...] = ()
         self._clock = ClockEstimate()
-        self._epoch = -1
 
     @property
     def known(self) -> bool:
@@ -77,13 +76,9 @@ class Wheel:
         """Follow the robot's clock. Returns the newest of what was applied since the last time."""
         newest = None
         for received in self._results.poll():
-            newest = received.message
-            if (sent := received.attachment) is None:
-                continue
-            if sent.epoch != self._epoch:
-                self._epoch = sent.epoch
-                self._clock.restart()
-            self._clock.note(sent.time_s, received.arrived_s)
+            sent = received.attachment
+            if sent is not None and self._clock.hear(sent.epoch, sent.time_s, received.arrived_s):
+                newest = received.message
         return newest
 
     def drive(self, action: Action, released: bool, local_s: float) -> None:
