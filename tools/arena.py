@@ -47,7 +47,7 @@ def teach(args: argparse.Namespace, method: Method, robot: RemoteRobot, publish:
         with (
             closing(crew(method, profile, args.seed, in_step, args.experts or task_of(world.name))) as team,
             closing(teacher(TEACHERS[args.teacher], profile, world, args.layout, args.seed)) as hand,
-            DemonstrationLog(folder / LABELS, profile, mirrored=method.mirrored) as log,
+            DemonstrationLog(folder / LABELS, profile, mirrored=method.mirrored, say=say) as log,
             RunWriter(folder / RECORD) as record,
         ):
             write = telling(say, record.write)

@@ -30,6 +30,7 @@ VERBS = {
     "joystick": Verb("tools.verbs.joystick", "drive by hand: a gamepad on this machine, straight to the robot"),
     "console": Verb("tools.verbs.console", "watch the robot learn on a screen"),
     "report": Verb("tools.verbs.report", "make the HTML page of a recorded run"),
+    "labels": Verb("tools.verbs.labels", "look through a log of labels for damage, and repair it"),
     "keys": Verb("tools.verbs.keys", "make the keys that say who may drive a robot, and encrypt the bus"),
     "stop-test": Verb("tools.verbs.stop_test", "break things while a robot drives, and measure how soon it stands"),
     "parity": Verb("tools.verbs.parity", "the same motions on two robots, and where they differ"),

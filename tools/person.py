@@ -50,7 +50,10 @@ def learn_from_person(
     folder: Path = args.run or Path("runs") / args.method
     # The log goes first: if it is damaged, nothing else is touched.
     mirrored = method_named(args.method).mirrored
-    with DemonstrationLog(folder / LABELS, profile, mirrored=mirrored) as log, RunWriter(folder / RECORD) as record:
+    with (
+        DemonstrationLog(folder / LABELS, profile, mirrored=mirrored, say=say) as log,
+        RunWriter(folder / RECORD) as record,
+    ):
         method = make()
         novice = method.novice
         try:
