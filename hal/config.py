@@ -7,12 +7,13 @@ import errno
 import os
 import stat
 import tomllib
+from contextlib import suppress
 from pathlib import Path
 from typing import BinaryIO, TypeVar
 
 import msgspec
 
-from hal.errors import ConfigError
+from hal.errors import ConfigError, StorageError
 
 T = TypeVar("T")
 MOST_BYTES = 2**20  # a hundred times the longest that comes with the project
@@ -82,3 +83,27 @@ def load_json(path: Path, kind: type[T], most: int = MOST_BYTES) -> T:
         raise ConfigError(f"{path} is nested too deeply", COMPARE) from error
     except MALFORMED as error:
         raise ConfigError(f"{path}: {error}", COMPARE) from error
+
+
+def write_whole(path: Path, data: bytes) -> None:
+    """Put a file in its place whole, and on the disk itself, or leave what is there. Raises `StorageError`.
+
+    A link stays one, and a device or a pipe is written to as it is.
+    """
+    whole = Path(os.path.realpath(path))
+    draft = whole.with_name(f"{whole.name}.{os.getpid()}.tmp")
+    try:
+        whole.parent.mkdir(parents=True, exist_ok=True)
+        if whole.exists() and not whole.is_file():
+            whole.write_bytes(data)
+            return
+        with draft.open("wb") as file:
+            file.write(data)
+            file.flush()
+            os.fsync(file.fileno())
+        draft.replace(whole)
+    except OSError as error:
+        with suppress(OSError):
+            draft.unlink()
+        what = f"cannot write {path}: {error.strerror}"
+        raise StorageError(what, "Free some space or choose another place.") from error
