@@ -5,6 +5,9 @@ ages bound that. The robot judges when a command was last sent: a process that d
 its last message. This side judges when it was decided: a loop that hangs is kept alive for 0.5 s, and the robot stops
 one time-out later. A person's hand is not a decision (it answers no observation): it streams by itself, is judged by
 its own stamp and never repeated.
+
+A robot that is started anew has another clock: nothing that was stamped before is kept, and as it has stopped by
+itself, the first neutral decision is answered here instead of arming it.
 """
 
 import math
@@ -25,7 +28,11 @@ DECISION_S = 0.5  # age at which a decision is no longer sent
 ANSWER_S = 0.05
 POLL_S = 0.002
 NAP_S = 0.02
+NOBODY = -1
 HEAR_S = 5.0
+# So long a robot is silent before another of its name is listened to: one that was started anew, and nobody who speaks
+# between its words. Both take longer to come up.
+SILENT_S = 0.3
 MOMENT_S = 0.5
 FAREWELL = 3  # neutral commands at the end: one may be lost
 
@@ -40,7 +47,8 @@ class RealTimeLink:
         self._results = bus.reader(APPLIED, depth=16)
         self._publishers = {Source.POLICY: bus.publisher(CMD_VEL), Source.TELEOP: bus.publisher(TELEOP)}
         self._clock = ClockEstimate()
-        self._epoch = -1
+        self._epoch = NOBODY  # of the robot that is listened to
+        self._heard_s = -math.inf  # when it was heard last, on this machine's clock
         self._own_epoch = bus.epoch
         self._newest: Applied | None = None
         self._untold = False  # the robot has stopped by itself, and whoever drives here has not heard of it
@@ -50,6 +58,11 @@ class RealTimeLink:
         self._heard = threading.Condition()
         self._stop = threading.Event()
         self._thread = threading.Thread(target=self._run, name="remote-robot", daemon=True)
+
+    @property
+    def epoch(self) -> int:
+        """Which start of the robot is listened to: its session's number. Times from before mean nothing after it."""
+        return self._epoch
 
     def start(self) -> None:
         """Listen until the robot's clock is known. Raises `BusError` if it says nothing."""
@@ -107,7 +120,7 @@ class RealTimeLink:
                 told = self._newest if self._untold else None
                 self._untold = False
                 self._held.pop(command.source, None)  # what was decided before holds no more
-                return told or Applied(STOP, now_s, reason=Reason.STALE)
+                return told if told is not None and told.reason in HELD else Applied(STOP, now_s, reason=Reason.STALE)
             if decided:
                 self._held[command.source] = command
                 self._send_held(now_s, command)
@@ -123,8 +136,9 @@ class RealTimeLink:
         return newest
 
     def wait(self, until_s: float) -> None:
-        """Sleep until the robot's clock says so."""
-        while (left_s := until_s - self.now()) > 0:
+        """Sleep until the robot's clock says so, or the robot is started anew and its clock with it."""
+        epoch = self._epoch
+        while self._epoch == epoch and (left_s := until_s - self.now()) > 0:
             time.sleep(min(left_s, NAP_S))
 
     def close(self) -> None:
@@ -151,16 +165,30 @@ class RealTimeLink:
                 continue
             with self._heard:
                 if attachment.epoch != self._epoch:
-                    self._epoch = attachment.epoch
-                    self._clock.restart()
-                    self._repeat_s = 0.0
+                    if received.arrived_s - self._heard_s < SILENT_S:
+                        continue
+                    self._begin_anew(attachment.epoch)
+                self._heard_s = received.arrived_s
                 self._clock.note(attachment.time_s, received.arrived_s)
                 self._note_stop(received.message)
                 self._newest = received.message
                 self._heard.notify_all()
 
+    def _begin_anew(self, epoch: int) -> None:
+        """Listen to a robot that was started. What was decided on another clock is not said to this one."""
+        self._untold = self._epoch != NOBODY
+        self._epoch = epoch
+        self._clock.restart()
+        self._held.clear()
+        self._newest = None
+        self._repeat_s = 0.0
+        self._senses.restart()
+        self._states.restart()
+
     def _note_stop(self, applied: Applied) -> None:
-        """Notice when the robot stops by itself."""
+        """Notice when the robot stops by itself. One that nobody has commanded yet has not moved since."""
+        if applied.reason is Reason.NO_COMMAND:
+            return
         if applied.reason not in HELD:
             self._untold = False
         elif self._newest is not None and self._newest.reason not in HELD:

@@ -3,12 +3,12 @@
 import argparse
 import difflib
 import importlib
-import os
 import signal
 import sys
-from typing import NamedTuple, Protocol, cast
+from typing import NamedTuple, NoReturn, Protocol, cast
 
 from hal.errors import ConfigError, LiraError, MissingExtraError
+from tools import lifetime
 
 
 class Verb(NamedTuple):
@@ -52,8 +52,8 @@ EXTRAS = {
 }
 
 EXIT_ERROR = 2
-EXIT_INTERRUPTED = 128 + signal.SIGINT
-EXIT_BROKEN_PIPE = 128 + signal.SIGPIPE
+EXIT_SIGNAL = 128  # and the signal's number
+EXIT_BROKEN_PIPE = EXIT_SIGNAL + signal.SIGPIPE
 
 
 class VerbModule(Protocol):
@@ -72,17 +72,21 @@ def main(arguments: list[str] | None = None) -> int:
     """Run `lira` with `arguments` (default: the command line's) and return its exit status.
 
     0: done. 1: done, but the answer is no (a demo that did not converge). 2: an error that the user can mend.
+    130, 143: ended by Ctrl-C or a kill. 141: whoever read the output has gone.
     """
     words = sys.argv[1:] if arguments is None else arguments
     prefix = f"lira {words[0]}" if words and words[0] in VERBS else "lira"
     try:
-        status = dispatch(words, prefix)
-        sys.stdout.flush()  # a reader that has gone shows here, not at exit
-    except KeyboardInterrupt:
-        return EXIT_INTERRUPTED
+        lifetime.claim_descriptors()
+        with lifetime.interruptible(), lifetime.heard():
+            try:
+                return dispatch(words, prefix)
+            finally:
+                sys.stdout.flush()  # a reader that has gone shows here, not at exit
+    except KeyboardInterrupt as interrupt:
+        return EXIT_SIGNAL + getattr(interrupt, "number", signal.SIGINT)
     except BrokenPipeError:
-        # Python flushes stdout once more at exit: give it somewhere to go.
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        lifetime.abandon_output()
         return EXIT_BROKEN_PIPE
     except ModuleNotFoundError as error:
         extra = EXTRAS.get((error.name or "").split(".")[0])
@@ -91,7 +95,21 @@ def main(arguments: list[str] | None = None) -> int:
         return complain(prefix, MissingExtraError(str(error.name), extra))
     except LiraError as error:
         return complain(prefix, error)
-    return status
+    except OSError as error:
+        if not lifetime.is_unwritable(error):
+            raise
+        lifetime.abandon_output()
+        return complain(prefix, lifetime.unwritable(error))
+    except (MemoryError, RuntimeError) as error:
+        scarce = lifetime.out_of_memory(error)
+        if scarce is None:
+            raise
+        return complain(prefix, scarce)
+
+
+def entry() -> NoReturn:
+    """Be the `lira` command: run it and end the process."""
+    lifetime.leave(main())
 
 
 def dispatch(words: list[str], program: str) -> int:

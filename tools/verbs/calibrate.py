@@ -12,10 +12,8 @@ examples:
 
 import argparse
 import math
-import signal
 import sys
-from collections.abc import Iterator
-from contextlib import closing, contextmanager
+from contextlib import closing
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -68,7 +66,7 @@ def run(args: argparse.Namespace) -> int:
     wanted = [name for name in KEYS if args.only in (None, name)]
     ask_for_consent(args, wanted)
     robot = GovernedRobot(Rosbot(profile, Devices(args.base, args.lidar, settings=settings)))
-    with ended_like_ctrl_c(), closing(robot):
+    with closing(robot):
         robot.open()
         manoeuvre = Manoeuvre(robot, Pace())
         for name in wanted:
@@ -96,18 +94,6 @@ def found(name: str, before: "BaseSettings", true: float, way: "Way") -> dict[st
     if abs(slip) > MOST_SLIP_M_RAD:
         raise not_measured(f"{slip:.3f} m ahead for each radian of a turn cannot be right", "Turn it on an even floor")
     return {KEYS[name]: scale, "spin_slip_m_rad": slip}
-
-
-@contextmanager
-def ended_like_ctrl_c() -> Iterator[None]:
-    """Let a kill, and a terminal that goes away, end this as Ctrl-C does: wheels at zero, lidar still."""
-    numbers = (signal.SIGTERM, signal.SIGHUP)
-    before = [signal.signal(number, signal.default_int_handler) for number in numbers]
-    try:
-        yield
-    finally:
-        for number, handler in zip(numbers, before, strict=True):
-            signal.signal(number, handler)
 
 
 def ask_for_consent(args: argparse.Namespace, wanted: list[str]) -> None:

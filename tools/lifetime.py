@@ -1,0 +1,185 @@
+"""How the process of a verb ends: at a signal, when nobody hears it any more, out of memory, with a dead link."""
+
+import contextlib
+import errno
+import os
+import signal
+import sys
+import threading
+from collections.abc import Callable, Iterator
+from types import FrameType
+from typing import NoReturn
+
+from hal.errors import LiraError, StorageError
+
+PATIENCE_S = 1.5
+# A client closes its bus within that: on a dead link it takes seconds, and `leave` does not wait for it.
+CLOSE_S = 0.5
+# What the system says when it does not take what is written, and no file is to blame that anybody has named.
+UNWRITABLE = (errno.ENOSPC, errno.EFBIG, errno.EDQUOT, errno.EIO, errno.EBADF)
+SCARCE = ("allocate memory", "start new thread", "Cannot allocate")
+
+
+class Interrupted(KeyboardInterrupt):
+    """A signal that asks the process to end, in the main thread: every `finally` runs."""
+
+    def __init__(self, number: int) -> None:
+        super().__init__()
+        self.number = number
+
+
+@contextlib.contextmanager
+def interruptible() -> Iterator[None]:
+    """Let a kill, and a terminal that goes away, end what runs in the main thread as Ctrl-C does.
+
+    A server takes its signals itself (`hal.server.stop_on_signal`). What a shell told the process to ignore it ignores.
+    """
+
+    def interrupt(number: int, frame: FrameType | None) -> NoReturn:  # noqa: ARG001 - the signature is Python's
+        raise Interrupted(number)
+
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    with _handling(interrupt, *_heeded(signal.SIGINT, signal.SIGTERM, signal.SIGHUP)):
+        yield
+
+
+@contextlib.contextmanager
+def _handling(handler: Callable[[int, FrameType | None], None], *numbers: int) -> Iterator[None]:
+    before = [signal.signal(number, handler) for number in numbers]
+    try:
+        yield
+    finally:
+        for number, earlier in zip(numbers, before, strict=True):
+            signal.signal(number, earlier)
+
+
+@contextlib.contextmanager
+def stop_or_interrupt() -> Iterator[threading.Event]:
+    """Give an event that a signal sets, for a client's loop; whoever does not heed it in time is interrupted.
+
+    A robot that is away, frozen or slow keeps a client waiting for longer than a person waits for the client.
+    """
+    stop, asked = threading.Event(), [int(signal.SIGINT)]
+
+    def ask(number: int, frame: FrameType | None) -> None:  # noqa: ARG001 - the signature is Python's
+        asked[0] = number
+        stop.set()
+        signal.setitimer(signal.ITIMER_REAL, PATIENCE_S)
+
+    def insist(number: int, frame: FrameType | None) -> NoReturn:  # noqa: ARG001
+        raise Interrupted(asked[0])
+
+    with _handling(ask, signal.SIGINT, signal.SIGTERM, *_heeded(signal.SIGHUP)):
+        before = signal.signal(signal.SIGALRM, insist)
+        try:
+            yield stop
+        finally:
+            signal.setitimer(signal.ITIMER_REAL, 0.0)
+            signal.signal(signal.SIGALRM, before)
+
+
+@contextlib.contextmanager
+def saving(snapshot: Callable[[], Callable[[], str]], say: Callable[[str], None]) -> Iterator[None]:
+    """Save at the end and say what was saved, whatever ends it; what ended it is raised, not what comes after.
+
+    `snapshot` takes what there is then, and returns the writing of it (`tools.run_folder.snapshot`).
+    """
+    try:
+        yield
+    except BaseException:
+        with contextlib.suppress(LiraError, OSError):
+            say(snapshot()())
+        raise
+    say(snapshot()())
+
+
+@contextlib.contextmanager
+def heard() -> Iterator[None]:
+    """End the process in an orderly way, as by a signal, when one of its threads cannot write to standard output.
+
+    Raises what that thread met, `OSError`.
+    """
+    lost: list[OSError] = []
+    before = threading.excepthook
+
+    def hook(arguments: threading.ExceptHookArgs) -> None:
+        error = arguments.exc_value
+        if isinstance(error, OSError) and (isinstance(error, BrokenPipeError) or is_unwritable(error)):
+            lost.append(error)
+            os.kill(os.getpid(), signal.SIGTERM)  # not raise_signal: the main thread has to wake up
+        else:
+            before(arguments)
+
+    threading.excepthook = hook
+    try:
+        yield
+    except Interrupted:
+        if not lost:
+            raise
+    finally:
+        threading.excepthook = before
+    if lost:
+        raise lost[0]
+
+
+def claim_descriptors() -> None:
+    """Have something behind the three standard descriptors: else the next file that is opened becomes one of them.
+
+    Then whatever a library prints would go into that file. Raises `StorageError` if there is no standard output.
+    """
+    closed = [number for number in (0, 1, 2) if not _is_open(number)]
+    for _ in closed:
+        os.open(os.devnull, os.O_RDWR)  # the lowest that is free
+    if sys.stderr is None:
+        sys.stderr = open(2, "w", closefd=False)  # noqa: SIM115 - as long as the process
+    if 1 in closed or sys.stdout is None:
+        sys.stdout = open(1, "w", closefd=False)  # noqa: SIM115
+        raise StorageError("standard output is closed", "Send it somewhere, if only to /dev/null.")
+
+
+def abandon_output() -> None:
+    """Give what is still buffered for standard output somewhere to go: Python writes it once more at its end."""
+    with contextlib.suppress(OSError, ValueError):
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+
+
+def is_unwritable(error: OSError) -> bool:
+    """Whether a write failed, to something that has no name."""
+    return error.filename is None and error.errno in UNWRITABLE
+
+
+def unwritable(error: OSError) -> LiraError:
+    """What to tell about it."""
+    return StorageError(f"cannot write the output: {error.strerror}", "Free some space, or send it elsewhere.")
+
+
+def out_of_memory(error: BaseException) -> LiraError | None:
+    """What to tell about an error that says that the machine has not enough; None for another one."""
+    if not isinstance(error, MemoryError) and not any(words in str(error) for words in SCARCE):
+        return None
+    return LiraError("there is not enough memory", "End other programs, or raise the limit (ulimit -v).")
+
+
+def leave(status: int) -> NoReturn:
+    """End the process. Python aborts when a thread comes out of zenoh while it ends, so then it is not asked to."""
+    if any(thread.name.startswith("bus_") for thread in threading.enumerate()):
+        for stream in (sys.stdout, sys.stderr):
+            with contextlib.suppress(OSError, ValueError):
+                stream.flush()
+        os._exit(status)
+    sys.exit(status)
+
+
+def _heeded(*numbers: int) -> list[int]:
+    """Those of some signals that whoever started the process did not tell it to ignore."""
+    return [number for number in numbers if signal.getsignal(number) is not signal.SIG_IGN]
+
+
+def _is_open(number: int) -> bool:
+    try:
+        os.fstat(number)
+    except OSError:
+        return False
+    return True
