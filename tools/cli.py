@@ -5,7 +5,7 @@ import difflib
 import importlib
 import signal
 import sys
-from typing import NamedTuple, NoReturn, Protocol, cast
+from typing import IO, NamedTuple, NoReturn, Protocol, cast
 
 from hal.errors import ConfigError, LiraError, MissingExtraError
 from tools import lifetime
@@ -68,6 +68,13 @@ class VerbModule(Protocol):
         """Do the work and return the exit status."""
 
 
+class Parser(argparse.ArgumentParser):
+    """A parser that does not keep to itself that its help cannot be written."""
+
+    def _print_message(self, message: str, file: IO[str] | None = None) -> None:
+        (file or sys.stderr).write(message)
+
+
 def main(arguments: list[str] | None = None) -> int:
     """Run `lira` with `arguments` (default: the command line's) and return its exit status.
 
@@ -122,7 +129,7 @@ def dispatch(words: list[str], program: str) -> int:
         return 0
     module = cast(VerbModule, importlib.import_module(find_verb(words[0]).module))
     description, _, examples = (module.__doc__ or "").partition("\n\n")
-    parser = argparse.ArgumentParser(
+    parser = Parser(
         prog=program,
         description=description,
         epilog=examples.rstrip(),

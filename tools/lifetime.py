@@ -3,7 +3,9 @@
 import contextlib
 import errno
 import os
+import select
 import signal
+import stat
 import sys
 import threading
 from collections.abc import Callable, Iterator
@@ -13,6 +15,7 @@ from typing import NoReturn
 from hal.errors import LiraError, StorageError
 
 PATIENCE_S = 1.5
+LOOK_S = 0.2
 # A client closes its bus within that: on a dead link it takes seconds, and `leave` does not wait for it.
 CLOSE_S = 0.5
 # What the system says when it does not take what is written, and no file is to blame that anybody has named.
@@ -97,28 +100,43 @@ def saving(snapshot: Callable[[], Callable[[], str]], say: Callable[[str], None]
 
 @contextlib.contextmanager
 def heard() -> Iterator[None]:
-    """End the process in an orderly way, as by a signal, when one of its threads cannot write to standard output.
+    """End the process in an orderly way, as by a signal, when nobody reads its standard output any more.
 
-    Raises what that thread met, `OSError`.
+    That shows in a pipe at once, and else when a thread writes in vain. Nobody would know of a server that went on.
+    Raises what was met, `OSError`.
     """
     lost: list[OSError] = []
-    before = threading.excepthook
+    before, done = threading.excepthook, threading.Event()
+
+    def end(error: OSError) -> None:
+        lost.append(error)
+        os.kill(os.getpid(), signal.SIGTERM)  # not raise_signal: the main thread has to wake up
 
     def hook(arguments: threading.ExceptHookArgs) -> None:
         error = arguments.exc_value
-        if isinstance(error, OSError) and (isinstance(error, BrokenPipeError) or is_unwritable(error)):
-            lost.append(error)
-            os.kill(os.getpid(), signal.SIGTERM)  # not raise_signal: the main thread has to wake up
+        if isinstance(error, BrokenPipeError) or (isinstance(error, OSError) and is_unwritable(error)):
+            end(error)
         else:
             before(arguments)
 
+    def look(pipe: select.poll) -> None:
+        while not done.wait(LOOK_S):
+            if pipe.poll(0):
+                end(BrokenPipeError(errno.EPIPE, os.strerror(errno.EPIPE)))
+                return
+
     threading.excepthook = hook
+    if _is_pipe(1):
+        pipe = select.poll()
+        pipe.register(1, 0)  # whether it is broken is told unasked
+        threading.Thread(target=look, args=[pipe], name="output", daemon=True).start()
     try:
         yield
     except Interrupted:
         if not lost:
             raise
     finally:
+        done.set()
         threading.excepthook = before
     if lost:
         raise lost[0]
@@ -175,6 +193,10 @@ def leave(status: int) -> NoReturn:
 def _heeded(*numbers: int) -> list[int]:
     """Those of some signals that whoever started the process did not tell it to ignore."""
     return [number for number in numbers if signal.getsignal(number) is not signal.SIG_IGN]
+
+
+def _is_pipe(number: int) -> bool:
+    return _is_open(number) and stat.S_ISFIFO(os.fstat(number).st_mode)
 
 
 def _is_open(number: int) -> bool:
