@@ -5,10 +5,13 @@ import difflib
 import importlib
 import signal
 import sys
-from typing import IO, NamedTuple, NoReturn, Protocol, cast
+from typing import TYPE_CHECKING, NamedTuple, NoReturn, Protocol, cast
 
 from hal.errors import ConfigError, LiraError, MissingExtraError
 from tools import lifetime
+
+if TYPE_CHECKING:
+    from _typeshed import SupportsWrite
 
 
 class Verb(NamedTuple):
@@ -71,7 +74,7 @@ class VerbModule(Protocol):
 class Parser(argparse.ArgumentParser):
     """A parser that does not keep to itself that its help cannot be written."""
 
-    def _print_message(self, message: str, file: IO[str] | None = None) -> None:
+    def _print_message(self, message: str, file: "SupportsWrite[str] | None" = None) -> None:
         (file or sys.stderr).write(message)
 
 
