@@ -182,8 +182,8 @@ class RealTimeLink:
         self._held.clear()
         self._newest = None
         self._repeat_s = 0.0
-        self._senses.restart()
-        self._states.restart()
+        self._senses.restart(epoch)
+        self._states.restart(epoch)
 
     def _note_stop(self, applied: Applied) -> None:
         """Notice when the robot stops by itself. One that nobody has commanded yet has not moved since."""

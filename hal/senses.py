@@ -1,6 +1,5 @@
 """A client's readers of everything a robot publishes, and the observation they add up to."""
 
-import time
 from typing import Any, Generic, Protocol, TypeVar
 
 from hal.bus import Bus
@@ -25,23 +24,25 @@ class Sense(Generic[S]):
     def __init__(self, bus: Bus, topic: Topic[S]) -> None:
         self._max_age_s = topic.max_age_s
         self._reader = bus.reader(topic)
-        self._not_before_s = self._not_before_local_s = float("-inf")
+        self._not_before_s = float("-inf")
+        self._epoch: int | None = None  # of the start that counts; any if None
         self.seq = -1  # the observation that the newest value belongs to
 
     def forget(self, before_s: float) -> None:
         """Return nothing any more that was captured before that time."""
         self._not_before_s = before_s
 
-    def restart(self) -> None:
-        """Return nothing any more that came before now: the robot's clock starts anew."""
-        self._not_before_s, self._not_before_local_s = float("-inf"), time.monotonic()
+    def restart(self, epoch: int) -> None:
+        """Return nothing any more but what comes from this start of the robot, whose clock is another one."""
+        self._not_before_s, self._epoch = float("-inf"), epoch
 
     def read(self, now_s: float) -> S | None:
         """Return the newest value if it is fresh at `now_s` on the robot's clock."""
         newest = self._reader.newest()
         if newest is None or newest.message.stamp_s < self._not_before_s:
             return None
-        if newest.arrived_s < self._not_before_local_s:
+        attachment = newest.attachment
+        if attachment is not None and self._epoch not in (None, attachment.epoch):
             return None
         # Far ahead is no better than far behind: it was captured before the robot's clock started anew.
         if abs(now_s - newest.message.stamp_s) > self._max_age_s:
@@ -70,11 +71,10 @@ class Senses:
     def _episodic(self) -> list[Sense[Any]]:
         return [self._scan, self._image, self._odom, self._imu, *self._ranges]
 
-    def restart(self) -> None:
-        """Return nothing any more that came before now: the robot's clock starts anew."""
-        for sense in self._episodic():
-            sense.restart()
-        self._battery.restart()
+    def restart(self, epoch: int) -> None:
+        """Return nothing any more but what comes from this start of the robot, whose clock is another one."""
+        for sense in (*self._episodic(), self._battery):
+            sense.restart(epoch)
 
     def observe(self, now_s: float, seq: int | None = None) -> Observation:
         """Put the fresh ones together. Without a `seq` it is the newest that came with any of them."""
