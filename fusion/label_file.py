@@ -32,6 +32,7 @@ MAGIC = b"LIRADEMO"
 VERSION = 1
 LIMIT = 1.01  # actions are in [-1, 1] and ranges in [0, 1], give or take the rounding of who divided
 BLOCK = 2**18
+NEAR_BYTES = 2**24
 
 _HEADER = struct.Struct("<8sHHHH")  # magic, version, bins, px, bytes of the profile's name
 _FIELDS = struct.Struct("<dqHHB32sdddd")  # stamp, observation, lap, run, flags, source, action, novice's action
@@ -219,8 +220,9 @@ def pieces(file: BinaryIO, form: Format, at: int) -> Iterator[tuple[bytes, Demon
             file.seek(at)
         else:
             found = _next_record(file, form, at + 1)
-            yield Damage(at, found - at)
-            at = found
+            end = file.seek(0, os.SEEK_END) if found is None else found
+            yield Damage(at, end - at)
+            at = end
             file.seek(at)
 
 
@@ -283,17 +285,17 @@ def heal(file: BinaryIO, found: Survey, path: Path) -> tuple[int, Path]:
 
 
 def find_format(file: BinaryIO, path: Path, candidates: Sequence[Format]) -> tuple[Format, int]:
-    """Return a log's format and where its records begin; where the header is damaged, what fits most records.
+    """Return a log's format and where its records begin; where the header is damaged, the first that fits a record.
 
-    Raises `StorageError` for a file in which nothing of any format is found.
+    Raises `StorageError` for a file in which nothing of any format is found near its beginning.
     """
     try:
         return read_format(file, path), file.tell()
     except StorageError:
-        counts = [survey(file, form, 0).count for form in candidates]
-        if not any(counts):
-            raise
-    return candidates[counts.index(max(counts))], 0
+        for form in candidates:
+            if _next_record(file, form, 0, NEAR_BYTES) is not None:
+                return form, 0
+        raise
 
 
 def beside(path: Path, suffix: str) -> Iterator[Path]:
@@ -318,17 +320,18 @@ def _keep(path: Path) -> Path:
     raise FileExistsError(f"too many damaged copies beside {path}")
 
 
-def _next_record(file: BinaryIO, form: Format, at: int) -> int:
-    """Where the next whole record begins, from byte `at` on; the end of the file if there is none."""
-    while True:
+def _next_record(file: BinaryIO, form: Format, at: int, until: float = math.inf) -> int | None:
+    """Where the next whole record begins, from byte `at` on and about before `until`; None if there is none."""
+    while at < until:
         file.seek(at)
         block = file.read(BLOCK + form.record_bytes)
         if len(block) < form.record_bytes:
-            return at + len(block)
+            return None
         for place in form.places(block):
             if form.decode(block[place : place + form.record_bytes]) is not None:
                 return at + int(place)
         at += len(block) - form.record_bytes + 1
+    return None
 
 
 def _content_bytes(file: BinaryIO, damage: Damage) -> int:
