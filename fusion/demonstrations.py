@@ -3,7 +3,7 @@
 A stored label survives `kill -9`: each record is one write to the kernel. The file is synced to the disk when it is
 closed, not at every label, which could stall the control loop: a power cut can cost what the kernel still holds.
 
-Nothing that was stored is deleted. Opening a damaged log finds every whole record in it (`label_file.py`), goes on with
+Nothing that was stored is deleted. Opening a damaged log finds every whole record (`label_salvage.py`), goes on with
 a clean file of these, and keeps the damaged one beside it.
 """
 
@@ -17,19 +17,9 @@ from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
 
-from fusion.label_file import (
-    Damage,
-    Format,
-    Survey,
-    beside,
-    find_format,
-    heal,
-    lock,
-    pieces,
-    read_format,
-    survey,
-)
 from fusion.label_file import Demonstration as Demonstration
+from fusion.label_file import Format, read_format
+from fusion.label_salvage import Damage, Survey, beside, find_format, heal, lock, pieces, survey
 from hal.config import open_regular
 from hal.errors import StorageError
 from hal.profile import RobotProfile

@@ -125,7 +125,7 @@ def test_damage_that_cannot_be_healed_leaves_the_file(tmp_path, log, monkeypatch
         raise OSError(28, "No space left on device")
 
     with monkeypatch.context() as patch:
-        patch.setattr("fusion.label_file.os.fsync", full)
+        patch.setattr("fusion.label_salvage.os.fsync", full)
         with pytest.raises(StorageError, match=r"damaged .* cannot be written anew: No space left") as refused:
             DemonstrationLog(path, SIM)
     assert "left as it is" in refused.value.remedy

@@ -17,7 +17,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from fusion.label_file import Survey
+    from fusion.label_salvage import Survey
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
