@@ -9,7 +9,7 @@ import time
 import pytest
 
 from hal.errors import StorageError
-from tools.lifetime import CLOSE_S, PATIENCE_S, Interrupted, heard, interruptible, leave, saving
+from tools.lifetime import CLOSE_S, PATIENCE_S, Interrupted, heard, interruptible, saving
 
 # It hears of a signal, and heeds it or not.
 CLIENT = """
@@ -90,10 +90,10 @@ def test_a_thread_that_writes_in_vain_ends_the_process_with_what_it_met():
         serve()
 
 
-def test_a_process_with_a_dead_link_leaves_without_waiting_for_it():
-    code = "import threading, time; from tools.lifetime import leave\n"
-    code += "threading.Thread(target=time.sleep, args=[60], name='bus_let_go').start(); print('x'); leave(3)"
+def test_a_process_with_a_dead_link_leaves_without_waiting_for_it_and_tidies_up(tmp_path):
+    code = "import sys, tempfile, threading, time; from tools.lifetime import leave\n"
+    code += f"folder = tempfile.TemporaryDirectory(dir={str(tmp_path)!r}); print('x')\n"
+    code += "threading.Thread(target=time.sleep, args=[60]).start(); leave(3)"
     done = subprocess.run([sys.executable, "-c", code], check=False, capture_output=True, text=True, timeout=10)
     assert (done.returncode, done.stdout) == (3, "x\n")
-    with pytest.raises(SystemExit):
-        leave(0)
+    assert list(tmp_path.iterdir()) == []
