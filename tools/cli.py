@@ -110,7 +110,7 @@ def main(arguments: list[str] | None = None) -> int:
             raise
         lifetime.abandon_output()
         return complain(prefix, lifetime.unwritable(error))
-    except (MemoryError, RuntimeError) as error:
+    except (MemoryError, RuntimeError, ImportError) as error:
         scarce = lifetime.out_of_memory(error)
         if scarce is None:
             raise

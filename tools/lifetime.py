@@ -21,7 +21,7 @@ LOOK_S = 0.2
 CLOSE_S = 0.5
 # What the system says when it does not take what is written, and no file is to blame that anybody has named.
 UNWRITABLE = (errno.ENOSPC, errno.EFBIG, errno.EDQUOT, errno.EIO, errno.EBADF)
-SCARCE = ("allocate memory", "start new thread", "Cannot allocate")
+SCARCE = ("allocate memory", "start new thread", "failed to map segment")
 
 
 class Interrupted(KeyboardInterrupt):

@@ -80,7 +80,9 @@ def test_closed_descriptors(tmp_path, closed):
         assert done.stdout.startswith("lira ")
 
 
-@pytest.mark.parametrize("error", [MemoryError(), RuntimeError("can't start new thread")])
+@pytest.mark.parametrize(
+    "error", [MemoryError(), RuntimeError("can't start new thread"), ImportError("x: failed to map segment")]
+)
 def test_too_little_memory_is_one_line(monkeypatch, capsys, error):
     def dispatch(*_):
         raise error
