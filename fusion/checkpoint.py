@@ -1,19 +1,26 @@
 """Networks on disk: a .safetensors file with the weights and, as text, where they come from. No pickle."""
 
 import json
-import os
-from contextlib import suppress
 from dataclasses import asdict, dataclass
 from pathlib import Path
+from typing import Annotated
 
 import msgspec
+import torch
+from msgspec import Meta
 from safetensors import SafetensorError, safe_open
 from safetensors.numpy import save
 
-from fusion.networks import IMAGE_PX, CameraNet, FusionNet, Kind, LidarNet, Network
+from fusion.networks import IMAGE_PX, CameraNet, FusionNet, Kind, LidarNet, Network, Weights
+from hal.config import MALFORMED, open_regular, write_whole
 from hal.errors import StorageError
+from hal.profile import MAX_BINS, MAX_FILTERS, MAX_IMAGE_PX
+
+MOST_BYTES = 2**28  # eighty times the largest network that any robot here needs
+LEAST_PX = 6  # two convolutions and a pooling leave one pixel of it
 
 _KEY = "lira"  # the one metadata entry, JSON
+_Share = Annotated[float, Meta(ge=-1.01, le=1.01)]  # of a robot's top speed
 
 
 @dataclass
@@ -26,67 +33,73 @@ class Checkpoint:
     """
 
     kind: Kind
-    bins: int
-    filters: int
+    bins: Annotated[int, Meta(ge=1, le=MAX_BINS)]
+    filters: Annotated[int, Meta(ge=1, le=MAX_FILTERS)]
     profile: str
-    cruise: tuple[float, float] | None
+    cruise: tuple[_Share, _Share] | None
     provenance: str
-    seed: int
-    px: int = IMAGE_PX
+    seed: Annotated[int, Meta(ge=0, le=2**63 - 1)]
+    px: Annotated[int, Meta(ge=LEAST_PX, le=MAX_IMAGE_PX)] = IMAGE_PX
     labels: int | None = None
     training_steps: int | None = None
 
 
 def save_checkpoint(path: Path, network: Network, checkpoint: Checkpoint) -> None:
     """Write a checkpoint whole or not at all. Raises `StorageError`."""
-    metadata = {_KEY: json.dumps(asdict(checkpoint))}
-    data = save(network.weights(), metadata)
-    draft = path.with_name(f"{path.name}.{os.getpid()}.tmp")
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        with draft.open("wb") as file:
-            file.write(data)
-            file.flush()
-            os.fsync(file.fileno())
-        draft.replace(path)
-    except OSError as error:
-        with suppress(OSError):
-            draft.unlink()
-        what = f"cannot write {path}: {error.strerror}"
-        raise StorageError(what, "Free some space or choose another folder.") from error
+    write_whole(path, save(network.weights(), {_KEY: json.dumps(asdict(checkpoint))}))
 
 
 def load_checkpoint(path: Path) -> tuple[Network, Checkpoint]:
-    """Read a checkpoint. Raises `StorageError` for a file that is missing, corrupt or of another kind."""
-    if not path.is_file():
+    """Read a checkpoint. Raises `StorageError` for a file that is missing, corrupt or of another kind.
+
+    Its shapes are compared with what it says of itself before a network is built or a weight is read.
+    """
+    if not path.exists():
         raise StorageError(f"there is no checkpoint {path}", "Check the path, or make one with 'lira train-expert'.")
     remedy = "Restore the file, or make it anew with the command that made it."
+    _check_size(path)
     try:
         with safe_open(path, framework="numpy") as file:
             metadata = file.metadata() or {}
-            weights = {name: file.get_tensor(name) for name in file.keys()}  # noqa: SIM118 - it is no dict
-    except (SafetensorError, OSError, ValueError) as error:
-        raise StorageError(f"{path} is not a whole .safetensors file: {error}", remedy) from error
-    if _KEY not in metadata:
-        raise StorageError(f"{path} is no checkpoint of this project", "Give a file that 'lira' has written.")
-    try:
-        checkpoint = msgspec.json.decode(metadata[_KEY], type=Checkpoint)
+            if _KEY not in metadata:
+                raise StorageError(f"{path} is no checkpoint of this project", "Give a file that 'lira' has written.")
+            checkpoint = msgspec.json.decode(metadata[_KEY], type=Checkpoint)
+            names = file.keys()
+            _check_shapes(checkpoint, {name: tuple(file.get_slice(name).get_shape()) for name in names})
+            weights: Weights = {name: file.get_tensor(name) for name in names}
         network = build(checkpoint)
         network.load_weights(weights)
-    except (msgspec.MsgspecError, ValueError) as error:
+    except (SafetensorError, OSError) as error:
+        raise StorageError(f"{path} is not a whole .safetensors file: {error}", remedy) from error
+    except MALFORMED as error:
         raise StorageError(f"{path} does not hold what it says it does: {error}", remedy) from error
     return network, checkpoint
 
 
+def _check_size(path: Path) -> None:
+    """Raise `StorageError` for what is no file, or larger than any checkpoint."""
+    try:
+        with open_regular(path) as file:
+            size = file.seek(0, 2)
+    except OSError as error:
+        raise StorageError(f"cannot read {path}: {error.strerror}", "Check the path.") from error
+    if size > MOST_BYTES:
+        raise StorageError(f"{path} has more than {MOST_BYTES} bytes", "Give a file that 'lira' has written.")
+
+
+def _check_shapes(checkpoint: Checkpoint, found: dict[str, tuple[int, ...]]) -> None:
+    """Compare shapes with those of the network described, of which nothing is allocated. Raises `ValueError`."""
+    with torch.device("meta"):
+        own = {name: tuple(tensor.shape) for name, tensor in build(checkpoint).state_dict().items()}
+    if own.keys() != found.keys():
+        raise ValueError(f"weights of another network: {', '.join(sorted(own.keys() ^ found.keys()))}")
+    for name, shape in own.items():
+        if found[name] != shape:
+            raise ValueError(f"{name} is {found[name]} instead of {shape}")
+
+
 def build(checkpoint: Checkpoint) -> Network:
     """Make the network a checkpoint describes, with fresh weights."""
-    if (
-        not 0
-        < min(checkpoint.bins, checkpoint.filters, checkpoint.px)
-        <= max(checkpoint.bins, checkpoint.filters)
-        < 4096
-    ):
-        raise ValueError(f"a network of {checkpoint.bins} bins and {checkpoint.filters} filters")
     if checkpoint.kind == "camera":
         return CameraNet(checkpoint.filters, px=checkpoint.px, seed=checkpoint.seed)
     if checkpoint.kind == "lidar":

@@ -9,7 +9,7 @@ from fusion.preprocess import Features, Preprocessor
 from hal.errors import SensorError
 from hal.messages import HELD as HELD
 from hal.messages import STOP, Action, Applied, Command, CourseState, Observation, Reason, Source, Twist
-from hal.port import Robot
+from hal.port import Restartable, Robot
 from hal.profile import Base
 
 
@@ -101,6 +101,13 @@ class ControlLoop:
         self._keep_time()
         return Step(observation, proposal, applied, lesson, state)
 
+    def restarted(self) -> bool:
+        """Whether the robot was started anew since this was asked last: it stands, and its clock is another one.
+
+        Raises `BusError` if another robot came in its place.
+        """
+        return isinstance(self._robot, Restartable) and self._robot.started_anew()
+
     def stand(self) -> None:
         """Let one period pass without a decision: the robot stands, unless a hand drives it."""
         self._stand(self._robot.read())
@@ -147,6 +154,10 @@ class ControlLoop:
         return Lesson(Choice("none", STAND))
 
     def _keep_time(self) -> None:
-        """Wait for the next absolute deadline; after a stall, start afresh instead of catching up."""
-        self._deadline_s = max(self._deadline_s + self._period_s, self._robot.now())
+        """Wait for the next absolute deadline; after a stall, start afresh instead of catching up.
+
+        A deadline that is far ahead is one of another clock: the robot was started anew.
+        """
+        now_s, next_s = self._robot.now(), self._deadline_s + self._period_s
+        self._deadline_s = next_s if now_s <= next_s <= now_s + 2 * self._period_s else now_s
         self._robot.wait(self._deadline_s)

@@ -4,6 +4,7 @@ It is a by-product and may be deleted; what was learned lives in the demonstrati
 """
 
 import math
+import os
 from collections.abc import Iterator
 from pathlib import Path
 from types import TracebackType
@@ -12,8 +13,11 @@ from typing import Self
 import msgspec
 
 from fusion.ledger import Account
+from hal.config import MALFORMED, open_regular
 from hal.errors import StorageError
 from hal.messages import CourseState, Decision
+
+LINE_BYTES = 2**20  # ten times what a step with the largest picture takes
 
 
 class Pose(msgspec.Struct, frozen=True):
@@ -126,13 +130,15 @@ Record = RunRecord | StepRecord | LapRecord | ResultRecord
 
 
 class RunWriter:
-    """Appends records to a file as JSON lines, one write each."""
+    """Appends records to a file as JSON lines, one write each. The torn last line of a killed run is cut off first."""
 
     def __init__(self, path: Path) -> None:
         self.path = path
         try:
             path.parent.mkdir(parents=True, exist_ok=True)
             self._file = path.open("ab", buffering=0)
+            if path.is_file():
+                self._file.truncate(_end_of_lines(path))
         except OSError as error:
             raise StorageError(
                 f"cannot write the run record {path}: {error.strerror}", "Choose another folder."
@@ -140,8 +146,10 @@ class RunWriter:
 
     def write(self, record: Record) -> None:
         """Append one record. Raises `StorageError` when the disk does not take it."""
+        line = memoryview(msgspec.json.encode(record) + b"\n")
         try:
-            self._file.write(msgspec.json.encode(record) + b"\n")
+            while line:  # after a short write the next one says why
+                line = line[self._file.write(line) :]
         except OSError as error:
             raise StorageError(f"cannot write to {self.path}: {error.strerror}", "Free some space.") from error
 
@@ -165,15 +173,25 @@ def read_run(path: Path) -> Iterator[Record]:
     """
     decoder = msgspec.json.Decoder(Record)
     try:
-        with path.open("rb") as file:
-            for number, line in enumerate(file, start=1):
-                if not line.endswith(b"\n"):
+        with open_regular(path) as file:
+            for number, line in enumerate(iter(lambda: file.readline(LINE_BYTES), b""), start=1):
+                if not line.endswith(b"\n") and len(line) < LINE_BYTES:
                     return
                 try:
                     yield decoder.decode(line)
-                except msgspec.MsgspecError as error:
+                except MALFORMED as error:
                     raise StorageError(
                         f"{path}, line {number}, is not a run record: {error}", "Is it the right file?"
                     ) from error
     except OSError as error:
         raise StorageError(f"cannot read {path}: {error.strerror}", "Check the path.") from error
+
+
+def _end_of_lines(path: Path) -> int:
+    """Where the last whole line of a file ends."""
+    with path.open("rb") as file:
+        end = file.seek(0, os.SEEK_END)
+        start = max(0, end - LINE_BYTES)
+        file.seek(start)
+        tail = file.read()
+    return start + tail.rfind(b"\n") + 1 if b"\n" in tail or start == 0 else end

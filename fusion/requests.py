@@ -34,7 +34,8 @@ class RequestLine:
         """Requests since the last time, and whether each came in time. One without a time is judged by its arrival."""
         now_s = self._now()
         sent = [(received.message, received.attachment) for received in self._asked.poll()]
-        return [(asked, at is None or now_s - at.time_s <= OPERATOR.max_age_s) for asked, at in sent]
+        # Far ahead is a time of another clock, from before the robot was started anew.
+        return [(asked, at is None or abs(now_s - at.time_s) <= OPERATOR.max_age_s) for asked, at in sent]
 
     def put(self, *, paused: bool, count: int, accepted: bool, words: str) -> None:
         """Send the newest answer, again now and then for who has come since."""

@@ -41,6 +41,11 @@ def serve(
     """
     said: Reason | None = Reason.OK
     while not stop.is_set():
+        if loop.restarted():
+            # Nothing of what was before belongs to what comes.
+            method.reset()
+            journal.ledger.new_episode()
+            say(f"the robot was started anew; what was learned goes on. It stands: {REARM}")
         if desk is not None:
             desk.serve()
             if desk.paused:

@@ -227,6 +227,8 @@ class Session:
     def _step(self, method: Method, teacher: Teacher | None) -> Step | None:
         """Return the next step; None where the robot stands before a box and sees nothing. Raises `DeviceError`."""
         for _ in range(LOST_OBSERVATIONS):
+            if self._loop.restarted():
+                raise DeviceError("the robot was started anew in the middle of a lap", "Begin anew, in another --run.")
             step = self._loop.step(method, teacher)
             if step is None:
                 continue

@@ -78,6 +78,14 @@ class DeviceMonitor(Protocol):
         """How the devices are now. Returns at once; may be called from any thread."""
 
 
+@runtime_checkable
+class Restartable(Protocol):
+    """What a robot may have beside the port: it can be started anew while it is driven, and its clock with it."""
+
+    def started_anew(self) -> bool:
+        """Whether it was since this was asked last. Raises `BusError` if another robot came in its place."""
+
+
 class Arena(Protocol):
     """What a twin can do and a floor cannot: start afresh, and tell where the robot really is."""
 

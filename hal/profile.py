@@ -17,6 +17,9 @@ from hal.errors import ConfigError
 Positive = Annotated[float, Meta(gt=0.0)]
 NotNegative = Annotated[float, Meta(ge=0.0)]
 Count = Annotated[int, Meta(ge=1)]
+
+# The largest networks and records that are read from a file. Thirty times what any robot here has.
+MAX_BINS, MAX_IMAGE_PX, MAX_FILTERS = 4096, 256, 512
 Angle = Annotated[float, Meta(gt=0.0, le=6.2832)]
 
 # Law 1: the wheels get zero no later than this after the last valid command.
@@ -84,10 +87,10 @@ class Features(Table, frozen=True):
     """
 
     fov_rad: Angle
-    bins: Count
+    bins: Annotated[int, Meta(ge=1, le=MAX_BINS)]
     max_range_m: Positive
-    image_px: Count
-    filters: Count
+    image_px: Annotated[int, Meta(ge=1, le=MAX_IMAGE_PX)]
+    filters: Annotated[int, Meta(ge=1, le=MAX_FILTERS)]
 
 
 class Control(Table, frozen=True):

@@ -12,6 +12,7 @@ from hal.remote_realtime import RealTimeLink
 from hal.topics import INFO, RESET
 
 INFO_S = 5.0
+AGAIN_S = 0.5  # to ask a robot that was just heard
 RESET_S = 20.0  # a new layout may have to be built
 
 
@@ -26,6 +27,7 @@ class RemoteRobot:
         self._answer_s = answer_s
         self._info: Info | None = None
         self._link: LockstepLink | RealTimeLink | None = None
+        self._epoch = 0
 
     @property
     def bus(self) -> Bus:
@@ -60,6 +62,25 @@ class RemoteRobot:
         self._info = info_from_json(self._bus.ask(INFO, timeout_s=self._answer_s))
         self._link = link
         link.start()
+        self._epoch = link.epoch
+
+    def started_anew(self) -> bool:
+        """Whether the robot was started anew since this was asked last: times from before mean nothing then.
+
+        Raises `BusError` if it came back as another one.
+        """
+        epoch = self.link.epoch
+        if epoch == self._epoch:
+            return False
+        try:
+            info = info_from_json(self._bus.ask(INFO, timeout_s=AGAIN_S))
+        except BusError:
+            return False  # gone again: asked once more the next time
+        if (info.profile, info.mode) != (self.profile, self.info.mode):
+            what = f"a robot '{info.profile.name}' ({info.mode}) came back in place of '{self.profile.name}'"
+            raise BusError(what, "Start this program anew for it.")
+        self._info, self._epoch = info, epoch
+        return True
 
     def read(self) -> Observation:
         """Return the newest of every sensor that is fresh by the topic table."""

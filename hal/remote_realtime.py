@@ -5,6 +5,9 @@ ages bound that. The robot judges when a command was last sent: a process that d
 its last message. This side judges when it was decided: a loop that hangs is kept alive for 0.5 s, and the robot stops
 one time-out later. A person's hand is not a decision (it answers no observation): it streams by itself, is judged by
 its own stamp and never repeated.
+
+A robot that is started anew has another clock: nothing that was stamped before is kept, and as it has stopped by
+itself, the first neutral decision is answered here instead of arming it.
 """
 
 import math
@@ -26,6 +29,7 @@ DECISION_S = 0.5  # age at which a decision is no longer sent
 ANSWER_S = 0.05
 POLL_S = 0.002
 NAP_S = 0.02
+NOBODY = -1
 HEAR_S = 5.0
 MOMENT_S = 0.5
 FAREWELL = 3  # neutral commands at the end: one may be lost
@@ -41,7 +45,7 @@ class RealTimeLink:
         self._results = bus.reader(APPLIED, depth=16)
         self._publishers = {Source.POLICY: bus.publisher(CMD_VEL), Source.TELEOP: bus.publisher(TELEOP)}
         self._clock = ClockEstimate()
-        self._epoch = -1
+        self._epoch = NOBODY  # of the robot that is listened to
         self._own_epoch = bus.epoch
         self._newest: Applied | None = None
         self._untold = False  # the robot has stopped by itself, and whoever drives here has not heard of it
@@ -57,6 +61,11 @@ class RealTimeLink:
             threading.Thread(target=self._run, args=[work, topic.key], name=f"remote-{name}", daemon=True)
             for name, work, topic in (("listen", self._listen, APPLIED), ("repeat", self._repeat, CMD_VEL))
         ]
+
+    @property
+    def epoch(self) -> int:
+        """Which start of the robot is listened to: its session's number. Times from before mean nothing after it."""
+        return self._epoch
 
     def start(self) -> None:
         """Listen until the robot's clock is known. Raises `BusError` if it says nothing."""
@@ -118,7 +127,9 @@ class RealTimeLink:
                     told = self._newest if self._untold else None
                     self._untold = False
                     self._held.pop(command.source, None)  # what was decided before holds no more
-                    return told or Applied(STOP, now_s, reason=Reason.STALE)
+                    if told is not None and told.reason in HELD:
+                        return told
+                    return Applied(STOP, now_s, reason=Reason.STALE)
                 if decided:
                     self._held[command.source] = command
                 due = self._due(now_s, command.source) if decided else [command]
@@ -134,8 +145,9 @@ class RealTimeLink:
         return newest
 
     def wait(self, until_s: float) -> None:
-        """Sleep until the robot's clock says so."""
-        while (left_s := until_s - self.now()) > 0:
+        """Sleep until the robot's clock says so, or the robot is started anew and its clock with it."""
+        epoch = self._epoch
+        while self._epoch == epoch and (left_s := until_s - self.now()) > 0:
             time.sleep(min(left_s, NAP_S))
 
     def close(self) -> None:
@@ -162,17 +174,28 @@ class RealTimeLink:
             if attachment is None:
                 continue
             with self._heard:
+                if not self._clock.hear(attachment.epoch, attachment.time_s, received.arrived_s):
+                    continue
                 if attachment.epoch != self._epoch:
-                    self._epoch = attachment.epoch
-                    self._clock.restart()
-                    self._repeat_s = 0.0
-                self._clock.note(attachment.time_s, received.arrived_s)
+                    self._begin_anew(attachment.epoch)
                 self._note_stop(received.message)
                 self._newest = received.message
                 self._heard.notify_all()
 
+    def _begin_anew(self, epoch: int) -> None:
+        """Listen to a robot that was started. What was decided on another clock is not said to this one."""
+        self._untold = self._epoch != NOBODY
+        self._epoch = epoch
+        self._held.clear()
+        self._newest = None
+        self._repeat_s = 0.0
+        self._senses.restart(epoch)
+        self._states.restart(epoch)
+
     def _note_stop(self, applied: Applied) -> None:
-        """Notice when the robot stops by itself."""
+        """Notice when the robot stops by itself. One that nobody has commanded yet has not moved since."""
+        if applied.reason is Reason.NO_COMMAND:
+            return
         if applied.reason not in HELD:
             self._untold = False
         elif self._newest is not None and self._newest.reason not in HELD:

@@ -28,24 +28,32 @@ class Sense(Generic[S]):
         self._not_before_s = float("-inf")
         self._judged: Received[S] | None = None  # the newest, and whether it came with an honest stamp
         self._honest = False
+        self._epoch: int | None = None  # of the start that counts; any if None
         self.seq = -1  # the observation that the newest value belongs to
 
     def forget(self, before_s: float) -> None:
         """Return nothing any more that was captured before that time."""
         self._not_before_s = before_s
 
+    def restart(self, epoch: int) -> None:
+        """Return nothing any more but what comes from this start of the robot, whose clock is another one."""
+        self._not_before_s, self._epoch = float("-inf"), epoch
+
     def read(self, now_s: float) -> S | None:
         """Return the newest value if it is fresh at `now_s` on the robot's clock."""
         newest = self._reader.newest()
         if newest is None or newest.message.stamp_s < self._not_before_s:
+            return None
+        attachment = newest.attachment
+        if attachment is not None and self._epoch not in (None, attachment.epoch):
             return None
         if newest is not self._judged:
             # One from ahead does not become fresh by waiting.
             self._judged, self._honest = newest, newest.message.stamp_s <= now_s + AHEAD_S
         if not self._honest or not is_fresh(newest.message.stamp_s, now_s, self._max_age_s):
             return None
-        if newest.attachment is not None:
-            self.seq = newest.attachment.seq
+        if attachment is not None:
+            self.seq = attachment.seq
         return newest.message
 
 
@@ -62,9 +70,16 @@ class Senses:
 
     def forget(self, before_s: float) -> None:
         """Return nothing any more that was captured before that time. A battery outlives an episode."""
-        senses: list[Sense[Any]] = [self._scan, self._image, self._odom, self._imu, *self._ranges]
-        for sense in senses:
+        for sense in self._episodic():
             sense.forget(before_s)
+
+    def _episodic(self) -> list[Sense[Any]]:
+        return [self._scan, self._image, self._odom, self._imu, *self._ranges]
+
+    def restart(self, epoch: int) -> None:
+        """Return nothing any more but what comes from this start of the robot, whose clock is another one."""
+        for sense in (*self._episodic(), self._battery):
+            sense.restart(epoch)
 
     def observe(self, now_s: float, seq: int | None = None) -> Observation:
         """Put the fresh ones together. Without a `seq` it is the newest that came with any of them."""

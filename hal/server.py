@@ -107,13 +107,16 @@ class HalServer:
         crew.start("estop", lambda: estop.run(stop))
         reporter = Reporter(self._robot, self._bus)
         crew.start("diagnostics", lambda: reporter.run(stop))
-        if opened.is_set():
-            self._ready()
-        # The main thread does nothing, so that it hears signals even while a sensor never answers.
-        stop.wait()
-        wheels.join(JOIN_S)
-        wheels_still.set()
-        sensors.join(JOIN_S)
+        try:
+            if opened.is_set():
+                self._ready()
+            # The main thread does nothing, so that it hears signals even while a sensor never answers.
+            stop.wait()
+        finally:
+            stop.set()
+            wheels.join(JOIN_S)
+            wheels_still.set()
+            sensors.join(JOIN_S)
         crew.raise_first_failure()
 
 
@@ -143,13 +146,15 @@ class _Crew:
 
 @contextmanager
 def stop_on_signal() -> Iterator[threading.Event]:
-    """Give an event that SIGTERM and Ctrl-C set, for the main thread of a process that serves."""
+    """Give an event that SIGTERM, Ctrl-C and a lost terminal set, for the main thread of a process that serves."""
     stop = threading.Event()
 
     def handle(number: int, frame: FrameType | None) -> None:  # noqa: ARG001 - the signature is Python's
         stop.set()
 
-    numbers = (signal.SIGTERM, signal.SIGINT)
+    numbers = [signal.SIGTERM, signal.SIGINT]
+    if signal.getsignal(signal.SIGHUP) is not signal.SIG_IGN:  # as nohup has it
+        numbers.append(signal.SIGHUP)
     before = [signal.signal(number, handle) for number in numbers]
     try:
         yield stop

@@ -7,8 +7,7 @@ from typing import Annotated
 
 from msgspec import Meta
 
-from hal.config import Table, load_toml, parse_toml
-from hal.errors import StorageError
+from hal.config import Table, load_toml, parse_toml, read_bounded, write_whole
 
 Scale = Annotated[float, Meta(gt=0.5, lt=2.0)]
 Seconds = Annotated[float, Meta(ge=0.0, le=10.0)]
@@ -62,14 +61,10 @@ def write_base_setting(path: Path, key: str, value: float) -> None:
     Raises `ConfigError` for a file that is none, `StorageError` if it cannot be written. It is whole at any time.
     """
     load_settings(path if path.exists() else None)
-    text = set_key(path.read_text(encoding="utf-8") if path.exists() else "", "base", key, repr(round(value, 5)))
+    before = read_bounded(path).decode() if path.exists() else ""
+    text = set_key(before, "base", key, repr(round(value, 5)))
     parse_toml(text, Settings, str(path))
-    new = path.with_name(path.name + ".new")
-    try:
-        new.write_text(text, encoding="utf-8")
-        new.replace(path)
-    except OSError as error:
-        raise StorageError(f"cannot write {path}: {error.strerror}", "Choose another file.") from error
+    write_whole(path, text.encode())
 
 
 def set_key(text: str, table: str, key: str, value: str) -> str:

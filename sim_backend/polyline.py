@@ -10,6 +10,7 @@ Floats = NDArray[np.float64]
 Indices = NDArray[np.int64]
 
 STEP_M = 0.1
+FAR_M = 1e6
 # A hint is the progress a moment ago. This is how far it may be off.
 WINDOW_M = 1.2
 
@@ -37,7 +38,12 @@ class Polyline:
         return self.segments * self.step_m
 
     def pose(self, progress_m: float, lateral_m: float = 0.0) -> tuple[float, float, float]:
-        """x, y and heading of the place `progress_m` along and `lateral_m` to the left."""
+        """x, y and heading of the place `progress_m` along and `lateral_m` to the left.
+
+        Raises `ValueError` for a place that is on no floor.
+        """
+        if not max(abs(progress_m), abs(lateral_m)) <= FAR_M:  # which nan is not
+            raise ValueError(f"{progress_m} m along and {lateral_m} m beside the line there is no floor")
         at = progress_m / self.step_m
         index = math.floor(at) % self.segments if self.closed else min(max(math.floor(at), 0), self.segments - 1)
         t = at - math.floor(at) if self.closed else at - index

@@ -23,6 +23,11 @@ Share = Annotated[float, Meta(ge=0.0, le=1.0)]
 CLOSING_M = 0.05
 CLOSING_DEG = 1.0
 MAX_JOINTS = 500
+# More than these take minutes to lay out, or more memory than there is.
+MAX_LINE_M = 10_000.0
+MAX_PIECES = 10_000
+MAX_BOXES = 1000
+MAX_SCATTERS = 100
 
 
 def refuse_empty(**ranges: tuple[float, float]) -> None:
@@ -78,6 +83,12 @@ class Line(Table, frozen=True):
     gray: Gray = 0
     offset_m: Metres = 0.0
     painted: bool = True
+
+    def __post_init__(self) -> None:
+        """Refuse a line that nobody drives to its end."""
+        length_m = sum(piece.length_m for piece in self.pieces) * self.repeat
+        if length_m > MAX_LINE_M or len(self.pieces) * self.repeat > MAX_PIECES:
+            raise ValueError(f"a line of {length_m:.0f} m in {len(self.pieces) * self.repeat} pieces is too long")
 
 
 class Patch(Table, frozen=True):
@@ -193,16 +204,19 @@ class World(Table, frozen=True):
     sky_gray: Gray = 230
     start: Start = Start()
     line: Line | None = None
-    patch: tuple[Patch, ...] = ()
-    tiles: tuple[Tiles, ...] = ()
-    box: tuple[Box, ...] = ()
-    along: tuple[Along, ...] = ()
-    area: tuple[Area, ...] = ()
+    patch: Annotated[tuple[Patch, ...], Meta(max_length=MAX_BOXES)] = ()
+    tiles: Annotated[tuple[Tiles, ...], Meta(max_length=MAX_SCATTERS)] = ()
+    box: Annotated[tuple[Box, ...], Meta(max_length=MAX_BOXES)] = ()
+    along: Annotated[tuple[Along, ...], Meta(max_length=MAX_SCATTERS)] = ()
+    area: Annotated[tuple[Area, ...], Meta(max_length=MAX_SCATTERS)] = ()
 
     def __post_init__(self) -> None:
         """Check what no single table can: raises `ValueError`, which loading turns into a `ConfigError`."""
         if self.line is None and self.along:
             raise ValueError("`along` scatters boxes along a line, and this world has no `line`")
+        boxes = len(self.box) + sum(along.count for along in self.along) + sum(area.count for area in self.area)
+        if boxes > MAX_BOXES:
+            raise ValueError(f"{boxes} boxes are more than {MAX_BOXES}")
         closed = self.line is not None and self.line.closed
         if not closed and self.limits.finish_m is None:
             raise ValueError("limits.finish_m is needed unless the line is closed")

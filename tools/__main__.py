@@ -1,8 +1,6 @@
 """`python -m tools` is the `lira` command."""
 
-import sys
-
-from tools.cli import main
+from tools.cli import entry
 
 if __name__ == "__main__":
-    sys.exit(main())
+    entry()

@@ -28,6 +28,7 @@ from hal.remote import RemoteArena, RemoteRobot
 from hal.remote_arena import WiredArena
 from sim_backend.world import World
 from tools.assembly import crew, lap, teacher
+from tools.lifetime import CLOSE_S, saving
 from tools.progress import Progress
 from tools.run_folder import LABELS, RECORD, head, snapshot
 
@@ -47,7 +48,7 @@ def teach(args: argparse.Namespace, method: Method, robot: RemoteRobot, publish:
         with (
             closing(crew(method, profile, args.seed, in_step, args.experts or task_of(world.name))) as team,
             closing(teacher(TEACHERS[args.teacher], profile, world, args.layout, args.seed)) as hand,
-            DemonstrationLog(folder / LABELS, profile, mirrored=method.mirrored) as log,
+            DemonstrationLog(folder / LABELS, profile, mirrored=method.mirrored, say=say) as log,
             RunWriter(folder / RECORD) as record,
         ):
             write = telling(say, record.write)
@@ -60,8 +61,9 @@ def teach(args: argparse.Namespace, method: Method, robot: RemoteRobot, publish:
             if team.pupil is None:
                 converged = session.prove(course)
             else:
-                converged = session.teach(course, hand, args.train_laps)
-                say(snapshot(folder, team.pupil.novice, profile, args)())
+                novice = team.pupil.novice
+                with saving(lambda: snapshot(folder, novice, profile, args), say):
+                    converged = session.teach(course, hand, args.train_laps)
             session.show(unseen(args, profile, world), hand if team.answered else None)
             write(session.result(converged))
     return 0 if converged else 1
@@ -91,7 +93,7 @@ def arena_of(args: argparse.Namespace, robot: RemoteRobot) -> Iterator[tuple[Are
         wired = WiredArena(bus, robot)
         yield wired, _world(wired.info)
     finally:
-        bus.close()
+        bus.close(CLOSE_S)
 
 
 def unseen(args: argparse.Namespace, profile: RobotProfile, world: World) -> list[Drive]:

@@ -3,12 +3,15 @@
 import argparse
 import difflib
 import importlib
-import os
 import signal
 import sys
-from typing import NamedTuple, Protocol, cast
+from typing import TYPE_CHECKING, NamedTuple, NoReturn, Protocol, cast
 
 from hal.errors import ConfigError, LiraError, MissingExtraError
+from tools import lifetime
+
+if TYPE_CHECKING:
+    from _typeshed import SupportsWrite
 
 
 class Verb(NamedTuple):
@@ -30,6 +33,7 @@ VERBS = {
     "joystick": Verb("tools.verbs.joystick", "drive by hand: a gamepad on this machine, straight to the robot"),
     "console": Verb("tools.verbs.console", "watch the robot learn on a screen"),
     "report": Verb("tools.verbs.report", "make the HTML page of a recorded run"),
+    "labels": Verb("tools.verbs.labels", "look through a log of labels for damage, and repair it"),
     "keys": Verb("tools.verbs.keys", "make the keys that say who may drive a robot, and encrypt the bus"),
     "stop-test": Verb("tools.verbs.stop_test", "break things while a robot drives, and measure how soon it stands"),
     "parity": Verb("tools.verbs.parity", "the same motions on two robots, and where they differ"),
@@ -51,8 +55,8 @@ EXTRAS = {
 }
 
 EXIT_ERROR = 2
-EXIT_INTERRUPTED = 128 + signal.SIGINT
-EXIT_BROKEN_PIPE = 128 + signal.SIGPIPE
+EXIT_SIGNAL = 128  # and the signal's number
+EXIT_BROKEN_PIPE = EXIT_SIGNAL + signal.SIGPIPE
 
 
 class VerbModule(Protocol):
@@ -67,21 +71,32 @@ class VerbModule(Protocol):
         """Do the work and return the exit status."""
 
 
+class Parser(argparse.ArgumentParser):
+    """A parser that does not keep to itself that its help cannot be written."""
+
+    def _print_message(self, message: str, file: "SupportsWrite[str] | None" = None) -> None:
+        (file or sys.stderr).write(message)
+
+
 def main(arguments: list[str] | None = None) -> int:
     """Run `lira` with `arguments` (default: the command line's) and return its exit status.
 
     0: done. 1: done, but the answer is no (a demo that did not converge). 2: an error that the user can mend.
+    130, 143: ended by Ctrl-C or a kill. 141: whoever read the output has gone.
     """
     words = sys.argv[1:] if arguments is None else arguments
     prefix = f"lira {words[0]}" if words and words[0] in VERBS else "lira"
     try:
-        status = dispatch(words, prefix)
-        sys.stdout.flush()  # a reader that has gone shows here, not at exit
-    except KeyboardInterrupt:
-        return EXIT_INTERRUPTED
+        lifetime.claim_descriptors()
+        with lifetime.interruptible(), lifetime.heard():
+            try:
+                return dispatch(words, prefix)
+            finally:
+                sys.stdout.flush()  # a reader that has gone shows here, not at exit
+    except KeyboardInterrupt as interrupt:
+        return EXIT_SIGNAL + getattr(interrupt, "number", signal.SIGINT)
     except BrokenPipeError:
-        # Python flushes stdout once more at exit: give it somewhere to go.
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        lifetime.abandon_output()
         return EXIT_BROKEN_PIPE
     except ModuleNotFoundError as error:
         extra = EXTRAS.get((error.name or "").split(".")[0])
@@ -90,7 +105,21 @@ def main(arguments: list[str] | None = None) -> int:
         return complain(prefix, MissingExtraError(str(error.name), extra))
     except LiraError as error:
         return complain(prefix, error)
-    return status
+    except OSError as error:
+        if not lifetime.is_unwritable(error):
+            raise
+        lifetime.abandon_output()
+        return complain(prefix, lifetime.unwritable(error))
+    except (MemoryError, RuntimeError, ImportError) as error:
+        scarce = lifetime.out_of_memory(error)
+        if scarce is None:
+            raise
+        return complain(prefix, scarce)
+
+
+def entry() -> NoReturn:
+    """Be the `lira` command: run it and end the process."""
+    lifetime.leave(main())
 
 
 def dispatch(words: list[str], program: str) -> int:
@@ -103,7 +132,7 @@ def dispatch(words: list[str], program: str) -> int:
         return 0
     module = cast(VerbModule, importlib.import_module(find_verb(words[0]).module))
     description, _, examples = (module.__doc__ or "").partition("\n\n")
-    parser = argparse.ArgumentParser(
+    parser = Parser(
         prog=program,
         description=description,
         epilog=examples.rstrip(),

@@ -22,8 +22,8 @@ from fusion.tasks import task_of
 from hal.bus import Bus
 from hal.messages import Decision, Episode
 from hal.remote import RemoteArena, RemoteRobot
-from hal.server import stop_on_signal
 from sim_backend.world import World
+from tools.lifetime import CLOSE_S, saving, stop_or_interrupt
 from tools.run_folder import FLOOR, LABELS, RECORD, head, snapshot
 
 Publish = Callable[[Decision], None]
@@ -34,7 +34,7 @@ def show_policy(args: argparse.Namespace, robot: RemoteRobot, publish: Publish, 
     """Let one policy drive until Ctrl-C."""
     expert = load_expert(args.policy, robot.profile, args.experts or task_of(world_of(robot)))
     method, journal, loop = Alone(expert.name, expert.act), Journal(publish=publish), ControlLoop(robot)
-    with stop_on_signal() as stop, request_line(robot, args) as line:
+    with stop_or_interrupt() as stop, request_line(robot, args) as line:
         desk = RequestDesk(line, loop, method, journal, say, restart=restarter(robot, args))
         loop.arm()
         say(f"'{args.policy}' drives '{args.name}'; stop with Ctrl-C")
@@ -45,21 +45,27 @@ def show_policy(args: argparse.Namespace, robot: RemoteRobot, publish: Publish, 
 def learn_from_person(
     args: argparse.Namespace, robot: RemoteRobot, make: Callable[[], Apprentice], publish: Publish, say: Say
 ) -> int:
-    """Learn from whoever takes the wheel with the dead-man, until Ctrl-C; then save the novice."""
+    """Learn from whoever takes the wheel with the dead-man, until Ctrl-C; then, or when it fails, save the novice."""
     profile = robot.profile
     folder: Path = args.run or Path("runs") / args.method
     # The log goes first: if it is damaged, nothing else is touched.
     mirrored = method_named(args.method).mirrored
-    with DemonstrationLog(folder / LABELS, profile, mirrored=mirrored) as log, RunWriter(folder / RECORD) as record:
+    with (
+        DemonstrationLog(folder / LABELS, profile, mirrored=mirrored, say=say) as log,
+        RunWriter(folder / RECORD) as record,
+    ):
         method = make()
         novice = method.novice
-        try:
+        with (
+            saving(lambda: snapshot(folder, novice, profile, args), say),
+            contextlib.closing(novice),
+        ):
             record.write(head(args, profile, world_of(robot)))
-            for old in read_demonstrations(folder / LABELS):
+            for old in read_demonstrations(log.path):
                 if old.stored:
                     novice.remember(Label(old.scan, old.image, old.action, old.source, novice.weight(old.source)))
             journal, loop = Journal(keep=log.append, write=record.write, publish=publish), ControlLoop(robot)
-            with stop_on_signal() as stop, request_line(robot, args) as line:
+            with stop_or_interrupt() as stop, request_line(robot, args) as line:
                 desk = RequestDesk(
                     line,
                     loop,
@@ -75,9 +81,6 @@ def learn_from_person(
                     serve(
                         loop, method, journal, stop, say, lambda: novice.training_steps, desk=desk, layout=args.layout
                     )
-        finally:
-            novice.close()
-    say(snapshot(folder, novice, profile, args)())
     return 0
 
 
@@ -88,7 +91,7 @@ def request_line(robot: RemoteRobot, args: argparse.Namespace) -> Iterator[Reque
     try:
         yield RequestLine(robot.bus, watch, robot.now)
     finally:
-        watch.close()
+        watch.close(CLOSE_S)
 
 
 def restarter(robot: RemoteRobot, args: argparse.Namespace) -> Callable[[], None] | None:

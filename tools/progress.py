@@ -8,6 +8,7 @@ from typing import TextIO
 import msgspec
 
 from fusion.record import LapRecord, Record, ResultRecord, RunRecord, StepRecord
+from hal.config import MALFORMED
 from hal.errors import StorageError
 
 PHASES = {"train": "training lap", "prove": "proving run", "unseen": "unseen layout"}
@@ -35,7 +36,7 @@ class Tail:
         self._offset += len(whole)
         try:
             return [self._decoder.decode(line) for line in whole.splitlines()]
-        except msgspec.MsgspecError as error:
+        except MALFORMED as error:
             raise StorageError(f"{self._path} is not a run record: {error}", "Is it the right file?") from error
 
 

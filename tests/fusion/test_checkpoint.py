@@ -1,4 +1,5 @@
 import json
+import os
 
 import numpy as np
 import pytest
@@ -79,7 +80,14 @@ def test_junk_and_a_folder_are_refused(tmp_path):
         {"filters": 10**9},
         {"bins": 0},
         {"px": 2},
+        {"px": 100_000},
+        {"px": 256},
+        {"filters": 512},
+        {"bins": 4096, "filters": 512, "px": 256},
         {"seed": "x"},
+        {"seed": -1},
+        {"seed": 10**30},
+        {"cruise": [1e308, 0.0]},
     ],
 )
 def test_a_checkpoint_that_is_not_what_it_says_is_refused(tmp_path, about):
@@ -90,6 +98,17 @@ def test_a_checkpoint_that_is_not_what_it_says_is_refused(tmp_path, about):
     save_file(FusionNet(101, 16).weights(), path, {"lira": json.dumps(fields | about)})
     with pytest.raises(StorageError, match="does not hold what it says"):
         load_checkpoint(path)
+
+
+def test_what_is_no_file_and_what_is_nested_without_end_are_refused(tmp_path):
+    os.mkfifo(tmp_path / "pipe")
+    (tmp_path / "zeros").symlink_to("/dev/zero")
+    with (tmp_path / "huge").open("wb") as huge:
+        huge.truncate(2**29)
+    save_file(LidarNet(101).weights(), tmp_path / "nested", {"lira": "[" * 100_000})
+    for name in ("pipe", "zeros", "huge", "nested"):
+        with pytest.raises(StorageError):
+            load_checkpoint(tmp_path / name)
 
 
 def test_weights_from_elsewhere_and_weights_that_are_not_finite_are_refused(tmp_path):

@@ -204,3 +204,39 @@ def test_a_stale_sensor_does_not_arm_a_robot_that_stopped_by_itself(null):
     held = loop.step(driver).applied
     assert (held.twist, held.source) == (Twist(0.0, 0.0), Source.NONE)
     robot.close()
+
+
+class StartedAnew(NullRobot):
+    """Its clock can be set back under the loop; it remembers how long it was told to wait."""
+
+    def __init__(self):
+        self.clock_s, self.waits_s, self.anew = 5000.0, [], False
+        super().__init__(PROFILE, lambda: self.clock_s, lambda _: None)
+
+    def wait(self, until_s):
+        self.waits_s.append(until_s - self.clock_s)
+        self.clock_s = max(self.clock_s, until_s)
+
+    def started_anew(self):
+        anew, self.anew = self.anew, False
+        return anew
+
+
+def test_a_deadline_on_the_clock_of_an_earlier_start_is_not_waited_for():
+    robot = StartedAnew()
+    robot.open()
+    loop = ControlLoop(robot)
+    for _ in range(3):
+        loop.stand()
+    assert not loop.restarted()
+    robot.clock_s, robot.anew = 0.5, True
+    assert loop.restarted()
+    assert not loop.restarted()
+    for _ in range(3):
+        loop.stand()
+    assert max(robot.waits_s) <= PROFILE.period_s + 1e-9
+    assert robot.clock_s == pytest.approx(0.5 + 2 * PROFILE.period_s)
+
+
+def test_a_robot_that_knows_no_restart_is_never_started_anew():
+    assert not ControlLoop(NullRobot(PROFILE)).restarted()

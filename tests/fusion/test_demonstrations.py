@@ -154,39 +154,6 @@ def test_a_header_torn_in_the_first_write_is_written_anew(tmp_path):
         assert holds(path, range(2))
 
 
-def test_damage_before_the_end_is_an_error_that_says_where(tmp_path):
-    path = tmp_path / "log"
-    write(path, range(6))
-    data, size = bytearray(path.read_bytes()), record_bytes(tmp_path)
-    offset = len(data) - 3 * size
-    data[offset + 700] ^= 0x10
-    path.write_bytes(data)
-    with pytest.raises(StorageError, match=f"corrupt at byte {offset}; the 3 records before it are good"):
-        DemonstrationLog(path, SIM)
-    records = read_demonstrations(path)
-    assert all(same(next(records), demonstration(k)) for k in range(3))
-    with pytest.raises(StorageError, match=f"corrupt at byte {offset}"):
-        next(records)
-    assert path.read_bytes() == bytes(data)  # nothing was repaired away
-
-
-def test_every_flipped_bit_is_noticed(tmp_path):
-    path = tmp_path / "log"
-    write(path, range(2))
-    data = path.read_bytes()
-    rng = np.random.default_rng(3)
-    for at in rng.integers(0, len(data), 60):
-        broken = bytearray(data)
-        broken[at] ^= 1 << rng.integers(8)
-        path.write_bytes(broken)
-        try:
-            found = list(read_demonstrations(path))
-        except StorageError:
-            continue
-        assert len(found) == 1  # the last record: like a torn tail
-        assert same(found[0], demonstration(0))
-
-
 def test_a_second_copy_is_refused(tmp_path):
     path = tmp_path / "log"
     with DemonstrationLog(path, SIM) as log:

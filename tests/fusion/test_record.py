@@ -48,6 +48,26 @@ def test_the_torn_last_line_of_a_killed_run_is_left_out(path):
         assert list(read_run(path)) == RECORDS[:-1]
 
 
+def test_a_run_that_goes_on_after_a_kill_goes_on_behind_the_last_whole_line(path):
+    whole = path.read_bytes()
+    for cut in (1, 60):
+        path.write_bytes(whole[:-cut])
+        with RunWriter(path) as writer:
+            writer.write(RECORDS[0])
+        assert list(read_run(path)) == [*RECORDS[:-1], RECORDS[0]]
+
+
+@pytest.mark.parametrize("content", [b"x" * 3_000_000, b"[" * 900_000 + b"\n"])
+def test_an_endless_line_and_one_nested_without_end_are_named(path, content):
+    path.write_bytes(content)
+    with pytest.raises(StorageError, match=r"line 1, is not a run record"):
+        list(read_run(path))
+    path.unlink()
+    path.symlink_to("/dev/zero")
+    with pytest.raises(StorageError, match="cannot read"):
+        list(read_run(path))
+
+
 @pytest.mark.parametrize("line", [b"not json\n", b'{"type":"nosuch"}\n', b'{"type":"lap"}\n', b"\xff\xfe\n"])
 def test_a_damaged_line_is_named(path, line):
     path.write_bytes(path.read_bytes() + line + b"{}\n")

@@ -20,7 +20,7 @@ from sim_backend.emulators.core2 import Core2Unit, Firmware
 from sim_backend.emulators.rplidar import RplidarUnit
 from sim_backend.emulators.wire import Wire
 from tools.calibration import CalibrationError, Way
-from tools.cli import EXIT_INTERRUPTED, main
+from tools.cli import EXIT_SIGNAL, main
 from tools.processes import ChildProcess, lira_command
 from tools.verbs import calibrate
 
@@ -210,7 +210,7 @@ def test_a_kill_and_a_lost_terminal_end_it_with_wheels_and_lidar_still(tmp_path,
                 assert time.monotonic() < until_s, child.output()
                 time.sleep(0.01)
             child.signal(number)
-            assert child.wait(10.0) == EXIT_INTERRUPTED
+            assert child.wait(10.0) == EXIT_SIGNAL + number
         assert room.twists[-1] == STOP
         assert room.true[0] < 0.3
         time.sleep(0.05)

@@ -109,10 +109,13 @@ def test_ending_the_demo_ends_its_processes(tmp_path, number):
     code = f"""
 import pathlib, sys
 from tools.rig import Part
+from tools.lifetime import interruptible
 from tools.verbs.demo import supervise
 command = [sys.executable, "-c", {child!r}]
+parts = [Part("the twin", "twin.log", "serves", lambda _: command)]
 try:
-    supervise([Part("the twin", "twin.log", "serves", lambda _: command)], command, pathlib.Path({str(tmp_path)!r}))
+    with interruptible():
+        supervise(parts, command, pathlib.Path({str(tmp_path)!r}))
 except KeyboardInterrupt:
     sys.exit(130)
 """

@@ -3,9 +3,8 @@
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
-import msgspec
-
-from hal.errors import StorageError
+from hal.config import load_toml, write_whole
+from hal.errors import ConfigError, StorageError
 from tools.bench import cell, columns
 from tools.experiments.experiment import Finding, Row
 from tools.experiments.fingerprint import ROOT
@@ -35,9 +34,9 @@ that met its cap of laps is censored: it counts with what it had used by then, a
 def read_causes(path: Path = CAUSES) -> dict[str, str]:
     """Read the likely causes of differences by the findings they explain. Raises `StorageError`."""
     try:
-        return msgspec.toml.decode(path.read_bytes(), type=dict[str, str])
-    except (OSError, msgspec.MsgspecError) as error:
-        raise StorageError(f"{path} is not a list of causes: {error}", 'Lines are "KEY" = "words".') from error
+        return load_toml(path, dict[str, str])
+    except ConfigError as error:
+        raise StorageError(f"{path} is not a list of causes: {error.what}", 'Lines are "KEY" = "words".') from error
 
 
 def cause(key: str, causes: Mapping[str, str]) -> str | None:
@@ -96,7 +95,4 @@ def table(rows: Sequence[Row]) -> str:
 
 def write_document(path: Path, text: str) -> None:
     """Write the page. Raises `StorageError`."""
-    try:
-        path.write_text(text, encoding="utf-8")
-    except OSError as error:
-        raise StorageError(f"cannot write {path}: {error.strerror}", "Choose another file with --out.") from error
+    write_whole(path, text.encode())

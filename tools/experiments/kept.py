@@ -1,12 +1,14 @@
 """Outcomes on disk, one file each."""
 
-import os
 from pathlib import Path
 
 import msgspec
 
-from hal.errors import StorageError
+from hal.config import load_json, write_whole
+from hal.errors import ConfigError, StorageError
 from tools.experiments.trial import Outcome, Trial
+
+MOST_BYTES = 2**28  # an outcome holds the way of the robot
 
 
 def kept(trial: Trial, folder: Path) -> Outcome | None:
@@ -18,22 +20,13 @@ def kept(trial: Trial, folder: Path) -> Outcome | None:
     if not path.exists():
         return None
     try:
-        return msgspec.json.decode(path.read_bytes(), type=Outcome)
-    except (OSError, msgspec.MsgspecError) as error:
+        return load_json(path, Outcome, MOST_BYTES)
+    except ConfigError as error:
         raise StorageError(
-            f"{path} is not the outcome of a trial: {error}", "Delete it to run the trial again."
+            f"{path} is not the outcome of a trial: {error.what}", "Delete it to run the trial again."
         ) from error
 
 
 def keep(outcome: Outcome, folder: Path) -> None:
     """Write an outcome whole or not at all. Raises `StorageError`."""
-    path = folder / outcome.trial.file
-    draft = path.with_suffix(f".{os.getpid()}.tmp")
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-        draft.write_bytes(msgspec.json.encode(outcome))
-        draft.replace(path)
-    except OSError as error:
-        raise StorageError(
-            f"cannot write {path}: {error.strerror}", "Free some space or choose another folder."
-        ) from error
+    write_whole(folder / outcome.trial.file, msgspec.json.encode(outcome))

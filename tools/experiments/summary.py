@@ -5,8 +5,11 @@ from pathlib import Path
 
 import msgspec
 
-from hal.errors import StorageError
+from hal.config import load_json, write_whole
+from hal.errors import ConfigError, StorageError
 from tools.experiments.experiment import Experiment, Finding, Outcomes, Row, Table
+
+MOST_BYTES = 2**24
 
 
 class Summary(msgspec.Struct, frozen=True):
@@ -53,20 +56,16 @@ def to_json(summary: Summary) -> str:
 
 def write_summary(path: Path, summary: Summary) -> None:
     """Write it, and the folder where there is none yet. Raises `StorageError`."""
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        path.write_text(to_json(summary) + "\n", encoding="utf-8")
-    except OSError as error:
-        raise StorageError(f"cannot write {path}: {error.strerror}", "Choose another --summaries.") from error
+    write_whole(path, (to_json(summary) + "\n").encode())
 
 
 def read_summary(path: Path) -> Summary:
     """Read what `to_json` wrote. Raises `StorageError`."""
     try:
-        return msgspec.json.decode(path.read_bytes(), type=Summary)
-    except (OSError, msgspec.MsgspecError) as error:
+        return load_json(path, Summary, MOST_BYTES)
+    except ConfigError as error:
         raise StorageError(
-            f"{path} is not the summary of an experiment: {error}", "Make it again with 'lira experiment'."
+            f"{path} is not the summary of an experiment: {error.what}", "Make it again with 'lira experiment'."
         ) from error
 
 

@@ -4,6 +4,7 @@ import select
 import time
 from pathlib import Path
 
+from hal.config import write_whole
 from hal.errors import DeviceError, StorageError
 from tools.joystick.learn import ASKS, Ask, moved_axis, pressed_button, to_toml
 from tools.joystick.mapping import Axis
@@ -36,10 +37,7 @@ def learn(path: Path, device: str | None) -> int:
             _wait_for_rest(pad, rest, answer)
     finally:
         pad.close()
-    try:
-        path.write_text(to_toml(node.name, found, node.axes, node.buttons), encoding="utf-8")
-    except OSError as error:
-        raise StorageError(f"cannot write {path}: {error.strerror}", "Choose another file.") from error
+    write_whole(path, to_toml(node.name, found, node.axes, node.buttons).encode())
     print(f"written: {path}; use it with: lira joystick --pad {path}")
     return 0
 

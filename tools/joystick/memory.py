@@ -8,7 +8,8 @@ from typing import Annotated
 import msgspec
 from msgspec import Meta
 
-from hal.config import Table
+from hal.config import Table, load_json, write_whole
+from hal.errors import ConfigError, StorageError
 from tools.joystick.freeze import LONGEST_S, SHORTEST_S
 
 
@@ -50,23 +51,25 @@ class PadMemory:
         self._pads[pad] = traits
         if self._path is not None:
             try:
-                self._save(self._path)
-            except OSError as error:
-                self._give_up(f"cannot write {self._path}: {error.strerror}")
+                write_whole(self._path, msgspec.json.format(msgspec.json.encode(self._pads)))
+            except StorageError as error:
+                self._give_up(error.what)
 
     def _load(self, path: Path) -> None:
         try:
-            self._pads = msgspec.json.decode(path.read_bytes(), type=dict[str, PadTraits])
-        except OSError as error:
-            self._give_up(f"cannot read {path}: {error.strerror}")
-        except (msgspec.MsgspecError, ValueError) as error:
-            self._say(f"{path} is not understood and will be written anew: {error}")
+            self._pads = load_json(path, dict[str, PadTraits])
+        except ConfigError as error:
+            self._set_aside(path, error.what)
 
-    def _save(self, path: Path) -> None:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        draft = path.with_name(f"{path.name}.{os.getpid()}.tmp")
-        draft.write_bytes(msgspec.json.format(msgspec.json.encode(self._pads)))
-        draft.replace(path)
+    def _set_aside(self, path: Path, why: str) -> None:
+        """Begin anew, and keep what could not be read."""
+        kept = path.with_name(f"{path.name}.damaged")
+        try:
+            path.replace(kept)
+        except OSError:
+            self._give_up(why)
+        else:
+            self._say(f"{why}; it is kept as {kept}, and what is learned about pads begins anew")
 
     def _give_up(self, why: str) -> None:
         self._path = None

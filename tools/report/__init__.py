@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from hal.errors import StorageError
+from hal.config import write_whole
 
 RECORD = "run.jsonl"
 PAGE = "report.html"
@@ -16,11 +16,6 @@ def write_report(folder: Path) -> Path:
     from tools.report.digest import load_run
     from tools.report.page import render
 
-    page, part = folder / PAGE, folder / f"{PAGE}.part"
-    text = render(load_run(folder / RECORD))
-    try:
-        part.write_text(text, encoding="utf-8")
-        part.replace(page)
-    except OSError as error:
-        raise StorageError(f"cannot write {page}: {error.strerror}", "Free some space or mend the rights.") from error
+    page = folder / PAGE
+    write_whole(page, render(load_run(folder / RECORD)).encode())
     return page

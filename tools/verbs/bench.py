@@ -16,7 +16,8 @@ import sys
 from pathlib import Path
 from typing import TextIO
 
-from hal.errors import ConfigError, StorageError
+from hal.config import write_whole
+from hal.errors import ConfigError
 from tools.bench import BENCHES, Row, cell, columns, describe_machine
 
 LASTING = ("soak", "drivers")  # those that go on for --minutes
@@ -67,10 +68,7 @@ def take_stdout() -> TextIO:
 
 def write_file(path: Path, text: str) -> None:
     """Write the object. Raises `StorageError`."""
-    try:
-        path.write_text(text + "\n", encoding="utf-8")
-    except OSError as error:
-        raise StorageError(f"cannot write {path}: {error.strerror}", "Choose another file.") from error
+    write_whole(path, (text + "\n").encode())
 
 
 def table(results: list[Row]) -> str:

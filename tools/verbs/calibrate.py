@@ -12,10 +12,8 @@ examples:
 
 import argparse
 import math
-import signal
 import sys
-from collections.abc import Iterator
-from contextlib import closing, contextmanager
+from contextlib import closing
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -70,7 +68,7 @@ def run(args: argparse.Namespace) -> int:
     if robot.field_off:
         raise ConfigError(robot.field_off, "Give --lidar, also with --by tape, or a --profile without [field].")
     ask_for_consent(args, wanted)
-    with ended_like_ctrl_c(), closing(robot):
+    with closing(robot):
         robot.open()
         manoeuvre = Manoeuvre(robot, Pace())
         for name in wanted:
@@ -98,18 +96,6 @@ def found(name: str, before: "BaseSettings", true: float, way: "Way") -> dict[st
     if abs(slip) > MOST_SLIP_M_RAD:
         raise not_measured(f"{slip:.3f} m ahead for each radian of a turn cannot be right", "Turn it on an even floor")
     return {KEYS[name]: scale, "spin_slip_m_rad": slip}
-
-
-@contextmanager
-def ended_like_ctrl_c() -> Iterator[None]:
-    """Let a kill, and a terminal that goes away, end this as Ctrl-C does: wheels at zero, lidar still."""
-    numbers = (signal.SIGTERM, signal.SIGHUP)
-    before = [signal.signal(number, signal.default_int_handler) for number in numbers]
-    try:
-        yield
-    finally:
-        for number, handler in zip(numbers, before, strict=True):
-            signal.signal(number, handler)
 
 
 def ask_for_consent(args: argparse.Namespace, wanted: list[str]) -> None:

@@ -14,6 +14,8 @@ import argparse
 import contextlib
 from pathlib import Path
 
+from tools.lifetime import CLOSE_S, stop_or_interrupt
+
 ANSWER_S = 10.0
 
 
@@ -42,18 +44,17 @@ def run(args: argparse.Namespace) -> int:
 
     from hal.bus import Bus
     from hal.desk import LOCKSTEP, info_from_json
-    from hal.server import stop_on_signal
     from hal.topics import INFO
     from tools.console.listen import Ears
     from tools.joystick.wheel import Wheel
 
     with contextlib.ExitStack() as stack:
         bus = Bus(args.name, connect=args.connect)
-        stack.callback(bus.close)
-        stop = stack.enter_context(stop_on_signal())
+        stack.callback(bus.close, CLOSE_S)
+        stop = stack.enter_context(stop_or_interrupt())
         info = info_from_json(bus.ask(INFO, timeout_s=ANSWER_S))
         watch = Bus(args.name, connect=args.connect, watch=True)
-        stack.callback(watch.close)
+        stack.callback(watch.close, CLOSE_S)
         by_hand = info.mode != LOCKSTEP and not args.no_keyboard  # no hand follows lockstep
         keyboard = Keyboard(Wheel(bus, watch, ANSWER_S)) if by_hand else None
         print(f"console shows '{args.name}' at {args.connect}", flush=True)

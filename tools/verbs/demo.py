@@ -17,7 +17,6 @@ exit status: 0 if the robot learned to drive alone, 1 if it did not within its l
 
 import argparse
 import shlex
-import signal
 import sys
 import time
 from collections.abc import Sequence
@@ -105,7 +104,6 @@ def supervise(parts: Sequence["Part"], fusion_command: list[str], folder: Path) 
 
     if (folder / RECORD).exists():
         raise ConfigError(f"{folder} already holds a run", "Choose another folder with --run.")
-    signal.signal(signal.SIGTERM, signal.default_int_handler)  # whoever ends the demo ends its processes
     try:
         watch(parts, fusion_command, folder)
     except KeyboardInterrupt:

@@ -15,7 +15,6 @@ examples:
 """
 
 import argparse
-import signal
 from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -23,6 +22,7 @@ from typing import TYPE_CHECKING
 from fusion.tasks import TASKS, task_of
 from hal.errors import ConfigError
 from tools.arguments import natural
+from tools.lifetime import CLOSE_S
 
 if TYPE_CHECKING:
     from fusion.presets import Method
@@ -95,7 +95,6 @@ def run(args: argparse.Namespace) -> int:
     if args.method is not None and method_of(args).kind == "switching" and args.teacher == "none":
         raise ConfigError(f"by the method '{args.method}' nobody learns", "Show it on a twin with --teacher perfect.")
     torch.set_num_threads(1)  # the nets are small; and a result should not depend on the number of cores
-    signal.signal(signal.SIGTERM, signal.default_int_handler)
     bus = Bus(args.name, connect=args.connect)
     robot = RemoteRobot(bus)
     try:
@@ -109,7 +108,7 @@ def run(args: argparse.Namespace) -> int:
         return teach(args, method_of(args), robot, publisher(robot), say)
     finally:
         robot.close()
-        bus.close()
+        bus.close(CLOSE_S)
 
 
 def show(args: argparse.Namespace, robot: "RemoteRobot") -> int:

@@ -17,6 +17,7 @@ import sys
 from pathlib import Path
 
 from hal.errors import DeviceError
+from tools.lifetime import CLOSE_S, stop_or_interrupt
 
 ANSWER_S = 10.0
 
@@ -46,7 +47,6 @@ def run(args: argparse.Namespace) -> int:
         return learn(args.learn, args.device)
 
     from hal.bus import Bus
-    from hal.server import stop_on_signal
     from hal.topics import INFO
     from tools.joystick.bridge import Bridge
     from tools.joystick.memory import PadMemory, state_file
@@ -54,7 +54,7 @@ def run(args: argparse.Namespace) -> int:
 
     bus, watch = Bus(args.name, connect=args.connect), None
     try:
-        with stop_on_signal() as stop:
+        with stop_or_interrupt() as stop:
             bus.ask(INFO, timeout_s=ANSWER_S)
             watch = Bus(args.name, connect=args.connect, watch=True)
             wheel = Wheel(bus, watch, ANSWER_S, say)
@@ -64,7 +64,7 @@ def run(args: argparse.Namespace) -> int:
     finally:
         for session in (bus, watch):
             if session is not None:
-                session.close()
+                session.close(CLOSE_S)
     return 0
 
 

@@ -14,7 +14,6 @@ exit status: 0 if nothing differs by more than is allowed, 1 if something does, 
 """
 
 import argparse
-import signal
 import sys
 from contextlib import ExitStack
 from pathlib import Path
@@ -23,6 +22,7 @@ from typing import TYPE_CHECKING
 
 from hal.errors import ConfigError, StorageError
 from tools.arguments import natural
+from tools.lifetime import CLOSE_S
 
 if TYPE_CHECKING:
     from tools.parity.compare import Row
@@ -55,7 +55,6 @@ def run(args: argparse.Namespace) -> int:
         raise ConfigError(
             f"parity compares two robots, not {len(ends)}", "Name two, or none for the twin and its wire."
         )
-    signal.signal(signal.SIGTERM, signal.default_int_handler)  # whoever ends this stops the robot and own processes
     first, second = [over_bus(*end) for end in ends] if ends else own(args)
     rows = compare(first, second)
     show(args, first, second, rows)
@@ -80,7 +79,7 @@ def over_bus(name: str, endpoint: str, shown: str = "") -> "Recording":
     try:
         return record(bus, shown or f"{name}@{endpoint}")
     finally:
-        bus.close()
+        bus.close(CLOSE_S)
 
 
 def own(args: argparse.Namespace) -> "tuple[Recording, Recording]":

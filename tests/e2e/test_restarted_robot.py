@@ -1,0 +1,111 @@
+"""The robot is started anew under the learner, and its clock begins at 0: the learner goes on, and can be ended."""
+
+import signal
+import threading
+import time
+from contextlib import contextmanager
+
+import pytest
+
+from fusion.demonstrations import read_demonstrations
+from hal.bus import Bus
+from hal.messages import STOP, Command, Source, Twist
+from hal.remote import RemoteRobot
+from tools.processes import ChildProcess, free_port, lira_command
+
+READY_S = 90.0
+SPEED = 5.0  # the first robot's clock is soon so far that nobody would wait for it
+LABELS = 10
+END_S = 5.0  # 3 s are promised; the rest is for a busy machine
+
+
+class Place:
+    """A name on the bus, and the processes there."""
+
+    def __init__(self, folder):
+        port = free_port()
+        self.folder, self.name, self.endpoint = folder, f"anew_{port}", f"127.0.0.1:{port}"
+
+    @contextmanager
+    def twin(self, *words):
+        command = lira_command("twin", "--world", "line", "--name", self.name, "--listen", self.endpoint, *words)
+        with ChildProcess("the twin", command, self.folder / "twin.log") as twin:
+            twin.wait_ready("serves", READY_S)
+            yield twin
+
+    @contextmanager
+    def learner(self):
+        words = ["--name", self.name, "--connect", self.endpoint, "--method", "lira", "--run", str(self.folder / "run")]
+        with ChildProcess("the learner", lira_command("fusion", *words), self.folder / "fusion.log") as learner:
+            learner.wait_ready("learns on", READY_S)
+            yield learner
+
+    @property
+    def labels(self):
+        return sum(1 for _ in read_demonstrations(self.folder / "run" / "labels.lira"))
+
+    def wait_for_labels(self, count, timeout_s, learner):
+        until_s = time.monotonic() + timeout_s
+        while self.labels < count:
+            assert time.monotonic() < until_s, (self.labels, learner.output())
+            time.sleep(0.1)
+
+
+@contextmanager
+def hand(place):
+    """Holds the dead-man: at rest for a moment, then ahead."""
+    bus = Bus(place.name, connect=place.endpoint)
+    robot, stop = RemoteRobot(bus, answer_s=READY_S), threading.Event()
+    robot.open()
+
+    def drive():
+        began_s = time.monotonic()
+        while not stop.wait(1 / 30):
+            twist = STOP if time.monotonic() - began_s < 0.5 else Twist(0.2, 0.0)
+            robot.drive(Command(twist, robot.now(), Source.TELEOP))
+
+    thread = threading.Thread(target=drive)
+    thread.start()
+    try:
+        yield
+    finally:
+        stop.set()
+        thread.join()
+        robot.close()
+        bus.close()
+
+
+def assert_ends(learner, number):
+    began_s = time.monotonic()
+    learner.signal(number)
+    assert learner.wait(20.0) == 0, learner.output()
+    assert time.monotonic() - began_s < END_S
+    assert "saved" in learner.output()
+    assert "Traceback" not in learner.output()
+
+
+def test_the_learner_goes_on_and_learns_from_a_robot_that_was_started_anew(tmp_path):
+    place = Place(tmp_path)
+    with place.twin("--speed", str(SPEED)) as twin, place.learner() as learner:
+        with hand(place):
+            place.wait_for_labels(LABELS, 20.0, learner)
+        time.sleep(8.0)
+        twin.signal(signal.SIGKILL)
+        twin.wait(5.0)
+        before = place.labels
+        with place.twin():
+            learner.wait_ready("started anew", 10.0)
+            with hand(place):
+                place.wait_for_labels(before + LABELS, 10.0, learner)
+            assert_ends(learner, signal.SIGINT)
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_the_learner_ends_after_its_robot_was_started_anew(tmp_path, number):
+    place = Place(tmp_path)
+    with place.twin("--speed", str(SPEED)) as twin, place.learner() as learner:
+        time.sleep(5.0)
+        twin.signal(signal.SIGKILL)
+        twin.wait(5.0)
+        with place.twin():
+            assert_ends(learner, number)

@@ -1,0 +1,166 @@
+"""A robot that is started anew while it is driven: its clock is another one, and nothing of the old one counts."""
+
+import threading
+import time
+from collections import deque
+
+import numpy as np
+import pytest
+
+from hal.attachment import Attachment
+from hal.bus import Received
+from hal.messages import HELD, STOP, Applied, Command, LaserScan, Reason, Source, Twist
+from hal.remote_realtime import SILENT_S, RealTimeLink
+from hal.topics import APPLIED, SCAN
+
+OLD, NEW = 1000.0, 3.0  # what the clocks say
+GO = Twist(0.5, 0.0)
+
+
+class FakeBus:
+    """What a link asks of a bus; the test says what comes and looks at what is sent."""
+
+    def __init__(self):
+        self.epoch, self.queues, self.sent = 99, {}, []
+        self.began_s = time.monotonic()
+
+    def reader(self, topic, depth=1):
+        return FakeReader(self.queues.setdefault(topic.key, deque()))
+
+    def publisher(self, topic, *_):
+        return FakePublisher(self, topic.key)
+
+    def say(self, topic, message, epoch, time_s):
+        attachment = Attachment(epoch, 1, round(time_s * 1e9), -1, False)
+        self.queues[topic.key].append(Received(message, attachment, time.monotonic()))
+
+
+class FakeReader:
+    def __init__(self, queue):
+        self._queue, self._newest = queue, None
+
+    def poll(self):
+        found = [self._queue.popleft() for _ in range(len(self._queue))]
+        if found:
+            self._newest = found[-1]
+        return found
+
+    def newest(self):
+        self.poll()
+        return self._newest
+
+
+class FakePublisher:
+    def __init__(self, bus, key):
+        self._bus, self._key = bus, key
+
+    def put(self, message, time_s, **_):
+        self._bus.sent.append((self._key, message, time_s))
+
+
+class FakeRobot:
+    """Says from a thread what it applied, 50 times a second, as the robot of one start."""
+
+    def __init__(self, bus, epoch, clock_s, reason=Reason.OK, twist=GO):
+        self._bus, self._epoch, self._reason, self._twist = bus, epoch, reason, twist
+        self._offset_s = clock_s - time.monotonic()
+        self._stop = threading.Event()
+        self._thread = threading.Thread(target=self._run)
+        self._thread.start()
+
+    def now(self):
+        return time.monotonic() + self._offset_s
+
+    def _run(self):
+        while not self._stop.wait(0.02):
+            now_s = self.now()
+            applied = Applied(self._twist, now_s, Source.POLICY, self._reason, epoch=99)
+            self._bus.say(APPLIED, applied, self._epoch, now_s)
+
+    def kill(self):
+        self._stop.set()
+        self._thread.join()
+
+
+@pytest.fixture
+def bus():
+    return FakeBus()
+
+
+@pytest.fixture
+def link(bus):
+    link = RealTimeLink(bus, 0.25)
+    yield link
+    link.close()
+
+
+def wait_for(condition, timeout_s=3.0):
+    until_s = time.monotonic() + timeout_s
+    while not condition():
+        assert time.monotonic() < until_s, "never happened"
+        time.sleep(0.005)
+
+
+def test_a_wait_on_the_old_clock_ends_with_it(bus, link):
+    first = FakeRobot(bus, 7, OLD)
+    link.start()
+    ended = threading.Event()
+    waiting = threading.Thread(target=lambda: (link.wait(link.now() + 3600.0), ended.set()))
+    waiting.start()
+    assert not ended.wait(0.2)
+    first.kill()
+    time.sleep(SILENT_S)
+    second = FakeRobot(bus, 8, NEW)
+    assert ended.wait(2.0)
+    second.kill()
+    waiting.join()
+    assert link.epoch == 8
+    assert link.now() == pytest.approx(second.now(), abs=0.2)
+
+
+def test_what_was_decided_and_seen_before_is_not_said_nor_read_after(bus, link):
+    first = FakeRobot(bus, 7, NEW)  # both clocks are near each other: the times alone would not tell
+    link.start()
+    bus.say(SCAN, LaserScan(first.now(), 0.0, 0.1, 0.1, 5.0, np.ones(3, np.float32)), 7, first.now())
+    assert link.read().scan is not None
+    link.drive(Command(GO, link.now(), answers=1))
+    wait_for(lambda: len(bus.sent) > 2)  # it is repeated
+    first.kill()
+    time.sleep(SILENT_S)
+    second = FakeRobot(bus, 8, NEW + 0.5, Reason.NO_COMMAND, STOP)
+    wait_for(lambda: link.epoch == 8)
+    bus.sent.clear()
+    time.sleep(0.2)
+    assert bus.sent == []
+    bus.say(SCAN, LaserScan(second.now(), 0.0, 0.1, 0.1, 5.0, np.ones(3, np.float32)), 7, second.now())
+    assert link.read().scan is None
+    bus.say(SCAN, LaserScan(second.now(), 0.0, 0.1, 0.1, 5.0, np.ones(3, np.float32)), 8, second.now())
+    assert link.read().scan is not None
+    second.kill()
+
+
+def test_the_first_neutral_decision_does_not_arm_a_robot_that_was_started_anew(bus, link):
+    first = FakeRobot(bus, 7, OLD)
+    link.start()
+    first.kill()
+    time.sleep(SILENT_S)
+    second = FakeRobot(bus, 8, NEW, Reason.NO_COMMAND, STOP)
+    wait_for(lambda: link.epoch == 8)
+    time.sleep(0.1)
+    bus.sent.clear()
+    assert link.drive(Command(STOP, link.now(), answers=1)).reason in HELD
+    assert bus.sent == []
+    link.drive(Command(STOP, link.now(), answers=2))  # now that the caller knows, it is a decision
+    assert bus.sent
+    second.kill()
+
+
+def test_who_speaks_between_the_words_of_the_robot_is_not_listened_to(bus, link):
+    robot = FakeRobot(bus, 7, OLD)
+    link.start()
+    for _ in range(20):
+        bus.say(APPLIED, Applied(STOP, 5.0, Source.POLICY), 8, 5.0)
+        time.sleep(0.01)
+    assert link.epoch == 7
+    assert link.now() == pytest.approx(robot.now(), abs=0.2)
+    robot.kill()
