@@ -66,7 +66,7 @@ class Reporter:
 
     def _governor(self) -> DiagnosticStatus:
         state = self._robot.state
-        counts = self._robot.refused | {"undecodable": self._inlet.dropped}
+        counts = self._robot.refused | {"undecodable": self._inlet.dropped, "no sender": self._inlet.nameless}
         values = tuple((f"refused: {reason}", str(count)) for reason, count in sorted(counts.items()))
         level = WARN if state in (State.STOPPED, State.EMERGENCY) else OK
         return DiagnosticStatus(level, f"{self._bus.robot}: governor", state.value, values)

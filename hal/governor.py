@@ -14,7 +14,7 @@ from dataclasses import replace
 from enum import StrEnum
 
 from hal.field import Clearance, limit_speed
-from hal.lease import Lease
+from hal.lease import Lease, session_of
 from hal.messages import STOP, Applied, Command, Reason, Source, Twist
 from hal.profile import RobotProfile
 
@@ -143,7 +143,10 @@ class Governor:
         if command is None:
             return Applied(twist, now_s, source, reason, clamps)
         age_s = now_s - command.stamp_s
-        return Applied(twist, now_s, source, reason, clamps, command.answers, age_s, command.epoch, command.seq)
+        session = session_of(command.epoch)
+        return Applied(
+            twist, now_s, source, reason, clamps, command.answers, age_s, session, command.seq, command.commander
+        )
 
     def halt(self) -> None:
         """Stop and forget every command."""
@@ -176,12 +179,12 @@ class Governor:
             return "out of order"
         if now_s - command.stamp_s >= timeout_s - ROUNDING_S:
             return "late"
-        return self._leases[command.source].objection(command.epoch, now_s)
+        return self._leases[command.source].objection((command.commander, command.epoch), now_s)
 
     def _accept(self, command: Command, now_s: float) -> None:
         source, lease = command.source, self._leases[command.source]
         self._newest_s[source] = command.stamp_s
-        lease.renew(command.epoch, now_s)
+        lease.renew((command.commander, command.epoch), now_s)
         twist = STOP if command.released else command.twist
         command = replace(command, twist=twist, stamp_s=min(command.stamp_s, now_s))
         self._live[source] = command

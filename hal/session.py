@@ -9,7 +9,8 @@ import json
 
 import zenoh
 
-from hal.errors import BusError
+from hal.access import access_list
+from hal.errors import BusError, ConfigError
 from hal.keys import Keys
 
 LEASE_MS = 2000
@@ -22,8 +23,15 @@ def open_session(
 ) -> zenoh.Session:
     """Open one; the arguments are those of `hal.bus.Bus`. With neither address it is connected to nobody.
 
-    Raises `BusError`: if it does not connect, after `CONNECT_MS` at the latest.
+    Whoever listens is a robot, and lets others do what `hal/access.py` says. Whoever connects hears the robot alone.
+
+    Raises `BusError`: if it does not connect, after `CONNECT_MS` at the latest; `ConfigError`: to listen with keys that
+    are no robot's.
     """
+    if listen is not None and keys is not None and keys.roles is None:
+        raise ConfigError(
+            f"{keys.folder} holds the keys of {keys.name}, which is no robot", "Use the bundle made for the robot."
+        )
     config = zenoh.Config()
     for key, value in {
         # Both ends are peers: a client would use one link only. What peers say is passed on to clients alone.
@@ -47,7 +55,8 @@ def open_session(
         "transport/shared_memory/enabled": False,
         # Late readers of a latched topic are served by its time stamp.
         "timestamping/enabled": True,
-        **({} if keys is None else keys.zenoh_config(robot)),
+        **({} if keys is None else {"transport/link/tls": keys.link_config()}),
+        **({} if listen is None else {"access_control": access_list(robot, None if keys is None else keys.roles)}),
     }.items():
         config.insert_json5(key, json.dumps(value))
     try:

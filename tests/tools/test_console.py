@@ -231,7 +231,7 @@ def drive_for(reader, duration_s=2.0):
     reader.poll()
     time.sleep(duration_s)
     results = [received.message for received in reader.poll()]
-    first = {(r.epoch, r.seq): r.stamp_s - r.command_age_s for r in reversed(results)}
+    first = {(r.session, r.seq): r.stamp_s - r.command_age_s for r in reversed(results)}
     return results, np.diff(sorted(first.values()))
 
 
