@@ -6,6 +6,7 @@ when its stream is up, or not at all; the datagrams follow in the background, as
 """
 
 import json
+import resource
 
 import zenoh
 
@@ -16,6 +17,7 @@ from hal.keys import Keys
 LEASE_MS = 2000
 OPEN_MS = 2000
 CONNECT_MS = 3000
+FILES = 65536
 
 
 def open_session(
@@ -32,6 +34,8 @@ def open_session(
         raise ConfigError(
             f"{keys.folder} holds the keys of {keys.name}, which is no robot", "Use the bundle made for the robot."
         )
+    if listen is not None:
+        _make_room()
     config = zenoh.Config()
     for key, value in {
         # Both ends are peers: a client would use one link only. What peers say is passed on to clients alone.
@@ -72,6 +76,14 @@ def open_session(
         raise BusError(
             f"cannot open the bus at {listen or connect}: {reason}", "Check the address, and that the robot runs."
         ) from error
+
+
+def _make_room() -> None:
+    """Let this process open as many files as it may: whoever comes, with keys or without, holds one for a while."""
+    soft, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
+    wanted = FILES if hard == resource.RLIM_INFINITY else min(FILES, hard)
+    if soft != resource.RLIM_INFINITY and soft < wanted:
+        resource.setrlimit(resource.RLIMIT_NOFILE, (wanted, hard))
 
 
 def _links(endpoint: str, keys: Keys | None) -> tuple[str, str]:
