@@ -6,7 +6,6 @@ trusted one by one: at the robot `ca.pem` holds an authority for each peer that 
 alone. So nobody but the robot is taken for it, and who is revoked does not get through the handshake.
 """
 
-import hashlib
 import os
 import re
 from collections.abc import Mapping
@@ -36,13 +35,13 @@ class Role(StrEnum):
 class Keys:
     """One peer's bundle. `roles` is the robot's list of who is enrolled, None for everybody else.
 
-    `digest` tells two contents of one folder apart.
+    `version` tells two states of one folder apart.
     """
 
     folder: Path
     name: str
     roles: Mapping[str, Role] | None
-    digest: bytes
+    version: tuple[Any, ...]
 
     def link_config(self) -> dict[str, Any]:
         """Return the session's settings for TLS both ways."""
@@ -61,7 +60,7 @@ class Keys:
 
     def changed(self) -> bool:
         """Whether the folder holds something else by now."""
-        return _digest(self.folder) != self.digest
+        return _version(self.folder) != self.version
 
 
 def keys_from_environment() -> Keys | None:
@@ -73,7 +72,7 @@ def keys_from_environment() -> Keys | None:
 def load_keys(folder: Path) -> Keys:
     """Load a bundle. Raises `ConfigError` if a file is missing or bad, or the key may be read by others."""
     folder = folder.resolve()
-    digest = _digest(folder)
+    version = _version(folder)
     for name in (CA, CERTIFICATE, KEY, NAME):
         if not (folder / name).is_file():
             raise ConfigError(f"{folder} holds no keys: {name} is missing", f"Make some with: lira keys init {folder}")
@@ -82,7 +81,7 @@ def load_keys(folder: Path) -> Keys:
     name = _read(folder / NAME).strip()
     if NAMES.fullmatch(name) is None:
         raise ConfigError(f"{folder / NAME} holds no name", "Copy the bundle again from where it was made.")
-    return Keys(folder, name, load_roles(folder), digest)
+    return Keys(folder, name, load_roles(folder), version)
 
 
 def load_roles(folder: Path) -> dict[str, Role] | None:
@@ -100,18 +99,22 @@ def load_roles(folder: Path) -> dict[str, Role] | None:
 
 
 def _read(path: Path) -> str:
-    with path.open("rb") as file:
-        data = file.read(LONGEST_BYTES)
+    try:
+        with path.open("rb") as file:
+            data = file.read(LONGEST_BYTES)
+    except OSError as error:
+        raise ConfigError(f"cannot read {path}: {error.strerror}", "Copy the bundle again.") from error
     return data.decode("utf-8", errors="replace")
 
 
-def _digest(folder: Path) -> bytes:
-    """Of all files of a bundle; a missing one counts as empty."""
-    digest = hashlib.blake2b(digest_size=16)
-    for name in (CA, CERTIFICATE, KEY, NAME, ROLES):
-        try:
-            data = _read(folder / name).encode()
-        except OSError:
-            data = b""
-        digest.update(len(data).to_bytes(8, "little") + data)
-    return digest.digest()
+def _version(folder: Path) -> tuple[Any, ...]:
+    """What tells two states of a bundle's files apart; found without opening any, which a crowd could prevent."""
+    return tuple(_stamp(folder / name) for name in (CA, CERTIFICATE, KEY, NAME, ROLES))
+
+
+def _stamp(path: Path) -> tuple[int, int, int] | None:
+    try:
+        found = path.stat()
+    except OSError:
+        return None
+    return found.st_ino, found.st_size, found.st_mtime_ns
