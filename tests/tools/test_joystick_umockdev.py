@@ -218,7 +218,7 @@ def test_a_frozen_pad_stands_and_drives_again_when_it_is_back(rig):
 def test_the_emergency_stop_and_its_release(rig, bus):
     rig.begin()
     rig.bed.key(PAD, "BTN_MODE", 1)
-    rig.says("emergency stop: the robot stands")
+    rig.says("emergency stop: the robot stands (confirmed by the robot)")
     assert look_at_estop(bus).pressed
     rig.bed.key(PAD, "BTN_MODE", 0)
     rig.let_go()
