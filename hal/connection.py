@@ -29,6 +29,7 @@ T = TypeVar("T")
 LOOK_S = 0.05
 RETRY_S = 0.2
 STALE_S = 0.5
+CLOSING_S = 2.0
 EVENTS = 64  # more links than ever are lost between two looks
 
 
@@ -101,11 +102,12 @@ class Connection:
             thread.join(max(0.0, until_s - time.monotonic()))
         return not any(thread.is_alive() for thread in self._threads)
 
-    def _begin(self, work: Callable[..., None], *arguments: Any) -> None:
+    def _begin(self, work: Callable[..., None], *arguments: Any) -> threading.Thread:
         self._threads = [thread for thread in self._threads if thread.is_alive()]
         thread = threading.Thread(target=work, args=arguments, name=f"bus{work.__name__}", daemon=True)
         thread.start()
         self._threads.append(thread)
+        return thread
 
     def _keep(self, connect: Callable[[], zenoh.Session]) -> None:
         while not self._closed.is_set():
@@ -128,7 +130,7 @@ class Connection:
             if not self.trouble and not stale():
                 continue
             if not self.trouble:
-                self._replace(self._idle())  # the address is free when the old session is closed
+                self._let_all_go()
             try:
                 session = listen()
             except LiraError as error:
@@ -137,15 +139,26 @@ class Connection:
                 self._replace(session)
                 self.trouble = ""
 
-    def _replace(self, session: zenoh.Session) -> None:
+    def _let_all_go(self) -> None:
+        """End all links, so that the address is free. Whatever it takes: some of them may be there no longer."""
+        try:
+            closing = self._replace(self._idle())
+        except BusError:  # a crowd holds all descriptors
+            _let_go(self.session)
+        else:
+            if closing is not None:
+                closing.join(CLOSING_S)
+
+    def _replace(self, session: zenoh.Session) -> threading.Thread | None:
+        """Declare everything on another session; returns what closes the old one, None if all is closed already."""
         with self._lock:
             if not self._closed.is_set():
                 before, self.session = self.session, session
                 for declared in self._declared:
                     declared.move(session)
-                self._begin(_let_go, before)  # which may take long while links are dead
-                return
+                return self._begin(_let_go, before)  # which may take long while links are dead
         _let_go(session)
+        return None
 
 
 def _lost_a_link(events: Any) -> bool:
