@@ -21,10 +21,10 @@ from hal.boundary import Boundary
 from hal.codec import decode, encode
 from hal.connection import Connection, Declared
 from hal.errors import BusError, ConfigError
-from hal.keys import Keys, keys_from_environment
+from hal.keys import Keys, keys_from_environment, load_keys
 from hal.refusals import Refusals
 from hal.session import open_session
-from hal.topics import ATTACHMENT_BYTES, QUESTION_BYTES, Qos, Topic
+from hal.topics import ATTACHMENT_BYTES, COMMANDS, QUESTION_BYTES, Qos, Topic, named
 
 M = TypeVar("M")
 
@@ -34,6 +34,7 @@ LINKS_PER_PEER = 2
 QUERY_PAUSE_S = 0.1
 QUESTIONS = 256  # that wait at most; each round answers no more
 SHOWN_REASON = 300  # characters of why a question was refused
+NONCE_BITS = 62
 POLL_S = 0.0005
 FIRST_S = 0.5  # how long to wait for a robot that is not there yet
 WATCH_S = 3.0
@@ -42,11 +43,25 @@ CLOSE_S = 3.5  # longer than an attempt to connect takes
 
 @dataclass(frozen=True, slots=True)
 class Received(Generic[M]):
-    """A message as it came. `arrived_s` is when it was polled, on this machine's monotonic clock."""
+    """A message as it came. `arrived_s` is when it was polled, on this machine's monotonic clock.
+
+    `key` is the whole key that it came on. `sender` is the id of the session that put it, "" if that does not stamp
+    what it puts (ours and ROS bridges do).
+    """
 
     message: M
     attachment: Attachment | None
     arrived_s: float
+    key: str = ""
+    sender: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class Answer:
+    """What was answered to a query, and the session (`epoch`) of who answered."""
+
+    payload: bytes
+    epoch: int
 
 
 class Publisher(Generic[M]):
@@ -141,7 +156,8 @@ class Reader(Generic[M]):
             self._boundary.refuse(self._topic.key, "too long")
             return None
         message = decode(self._topic.kind, bytes(sample.payload))
-        return Received(message, parse_attachment(None if attached is None else bytes(attached)), time.monotonic())
+        sent = parse_attachment(None if attached is None else bytes(attached))
+        return Received(message, sent, time.monotonic(), str(sample.key_expr), self._sender(sample))
 
     def newest(self) -> Received[M] | None:
         """Return the newest message that ever came, however old it is."""
@@ -149,27 +165,42 @@ class Reader(Generic[M]):
         return self._newest
 
     def _next(self) -> Any:
-        try:
-            return self._subscriber.now.try_recv()
-        except zenoh.ZError as error:
-            if not self._connection.closed:
-                return None  # its session is just being replaced
-            raise BusError(f"the bus is closed: {error}", "Open it again.") from error
+        return _take(self._connection, self._subscriber)
+
+    def _sender(self, sample: zenoh.Sample) -> str:
+        """Who put it. What comes without a stamp gets one of this session."""
+        stamp = sample.timestamp
+        if stamp is None or (sender := str(stamp.get_id())) == str(self._connection.session.zid()):
+            return ""
+        return sender
+
+
+def _take(connection: Connection, declared: Declared[Any]) -> Any:
+    """Take the next of what came, None for nothing. Raises `BusError` once the bus is closed."""
+    try:
+        return declared.now.try_recv()
+    except zenoh.ZError as error:
+        if not connection.closed:
+            return None  # its session is just being replaced
+        raise BusError(f"the bus is closed: {error}", "Open it again.") from error
 
 
 class Question:
-    """A query that waits for its answer."""
+    """A query that waits for its answer, which names the session (`epoch`) that gives it, and what it answers."""
 
-    def __init__(self, query: zenoh.Query) -> None:
+    def __init__(self, query: zenoh.Query, epoch: int) -> None:
         self._query = query
+        self._epoch = epoch
         self.payload = b"" if query.payload is None else bytes(query.payload)
         self.answered = False
 
     def answer(self, payload: bytes) -> None:
         """Reply, and be done with it."""
+        asked = _attachment(self._query)
+        nonce = 0 if asked is None else asked.seq
         self.answered = True
         with self._query as query:
-            query.reply(query.key_expr, payload)
+            query.reply(query.key_expr, payload, attachment=Attachment(self._epoch, nonce, 0).to_bytes())
 
     def refuse(self, why: str) -> None:
         """Reply that it cannot be done, and why."""
@@ -181,11 +212,14 @@ class Question:
 class Questions:
     """The queries on a key. Of those that nobody has looked at the newest `QUESTIONS` stay, and nobody waits."""
 
-    def __init__(self, connection: Connection, queryable: Declared[Any], key: str, boundary: Boundary) -> None:
+    def __init__(
+        self, connection: Connection, queryable: Declared[Any], key: str, boundary: Boundary, epoch: int
+    ) -> None:
         self._connection = connection
         self._queryable = queryable
         self._key = key
         self._boundary = boundary
+        self._epoch = epoch
 
     def serve(
         self, answer: Callable[[Question], None], most: int = QUESTIONS, prepare: Callable[[], None] = lambda: None
@@ -208,22 +242,14 @@ class Questions:
     def _take(self, most: int) -> list[Question]:
         asked: list[Question] = []
         for _ in range(most):
-            if (query := self._next()) is None:
+            query: zenoh.Query | None = _take(self._connection, self._queryable)
+            if query is None:
                 break
             if query.payload is not None and len(query.payload) > QUESTION_BYTES:
                 self._boundary.refuse(self._key, "too long")
             else:
-                asked.append(Question(query))
+                asked.append(Question(query, self._epoch))
         return asked
-
-    def _next(self) -> zenoh.Query | None:
-        try:
-            query: zenoh.Query | None = self._queryable.now.try_recv()
-        except zenoh.ZError as error:
-            if not self._connection.closed:
-                return None  # its session is just being replaced
-            raise BusError(f"the bus is closed: {error}", "Open it again.") from error
-        return query
 
 
 class Bus:
@@ -237,8 +263,8 @@ class Bus:
     Peers hear the robot, not one another. With `watch` a session hears what all of them say, through the robot and
     over one link: for consoles and the like, not for driving; nobody there to connect to is a `BusError` then.
     `refusals` is what counts those whom keys keep out, for whoever reports it; `boundary` counts what came and was not
-    taken, and guards whoever handles messages. `prefix` is what keys begin with instead
-    of the name, for a robot that is not ours; it may be empty.
+    taken, and guards whoever handles messages. `prefix` is what keys begin with instead of the name, for a robot that
+    is not ours; it may be empty. `name` is the one that commands are sent in: that on the certificate, "" without keys.
 
     Raises `BusError` if the port is taken, `ConfigError` for a bad name, endpoint or keys.
     """
@@ -266,6 +292,7 @@ class Bus:
         self._counts: dict[str, Iterator[int]] = {}  # what was sent, by key: they grow whoever sends
         keys = keys or keys_from_environment()
         self.encrypted = keys is not None
+        self.name = keys.name if keys is not None and connect and prefix is None else ""
         for endpoint in (listen, connect):
             _check_address(endpoint)
         if listen and not (self.encrypted or insecure or _is_loopback(listen)):
@@ -273,11 +300,16 @@ class Bus:
                 f"without keys anybody who reaches {listen} could drive the robot",
                 "Make keys with: lira keys init keys; listen on 127.0.0.1; or say --insecure.",
             )
+        self._keys = keys
         self._connection = Connection(
-            lambda: open_session(robot, listen, None, keys, prefix=self._prefix),
+            lambda: open_session(robot, None, None, None),
             None
             if connect is None
             else lambda: open_session(robot, None, connect, keys, prefix=self._prefix, watch=watch),
+            None
+            if listen is None
+            else lambda: open_session(robot, listen, None, self._read_keys(), prefix=self._prefix),
+            None if keys is None else self._keys_changed,
         )
         if connect and not self._connection.wait_up(WATCH_S if watch else FIRST_S) and watch:
             self.close()
@@ -293,7 +325,7 @@ class Bus:
             "express": qos.express,
             "reliability": qos.reliability,
         }
-        key = self._key(topic.key)
+        key = self._key(self._own(topic).key)
 
         def declare(session: zenoh.Session) -> Any:
             if not qos.latched:
@@ -307,7 +339,7 @@ class Bus:
     def put_raw(self, topic: Topic[Any], payload: bytes, attachment: bytes | None = None) -> None:
         """Send bytes as they are: for relays, recorders and tests of what a bus has to bear."""
         self._session.put(
-            self._key(topic.key),
+            self._key(self._own(topic).key),
             payload,
             attachment=attachment,
             priority=topic.qos.priority,
@@ -334,36 +366,43 @@ class Bus:
         def declare(session: zenoh.Session) -> Any:
             return session.declare_queryable(self._key(key), RingChannel(QUESTIONS))
 
-        return Questions(self._connection, self._connection.declare(declare), key, self.boundary)
+        return Questions(self._connection, self._connection.declare(declare), key, self.boundary, self.epoch)
 
     def ask(self, key: str, payload: bytes = b"", timeout_s: float = 5.0) -> bytes:
         """Query a key and return the answer; asks again while nobody is there to answer.
 
         Raises `BusError` if nobody answers in time, or with the reason of a refusal.
         """
+        return self.answer(key, payload, timeout_s).payload
+
+    def answer(self, key: str, payload: bytes = b"", timeout_s: float = 5.0, epoch: int | None = None) -> Answer:
+        """As `ask`, and who answered. With `epoch` only the answer of that session counts.
+
+        What is no answer to this very query (it carries a number that nobody can know before) is passed over.
+        """
         deadline_s = time.monotonic() + timeout_s
         while (left_s := deadline_s - time.monotonic()) > 0:
             reply = self._get(key, payload, left_s)
-            if reply is None:
-                time.sleep(QUERY_PAUSE_S)
-            elif reply.ok is not None:
-                return bytes(reply.ok.payload)
-            elif reply.err is not None and (why := bytes(reply.err.payload).decode(errors="replace")) != "Timeout":
-                raise BusError(f"{self.robot} refused '{key}': {why}")
+            if isinstance(reply, Answer) and epoch in (None, reply.epoch):
+                return reply
+            if isinstance(reply, str) and reply != "Timeout":
+                raise BusError(f"{self.robot} refused '{key}': {reply}")
+            time.sleep(QUERY_PAUSE_S)
         raise BusError(
             f"no robot named '{self.robot}' answers '{key}' at {self.endpoint}",
-            "Start one with: lira twin; or check the name, the address and the firewall.",
+            "Start one with: lira twin; or check the name, the address, the firewall and what your keys allow.",
         )
 
     def is_answered(self, key: str, timeout_s: float) -> bool:
         """Whether anybody answers a key now."""
-        reply = self._get(key, b"", timeout_s)
-        return reply is not None and reply.ok is not None
+        return isinstance(self._get(key, b"", timeout_s), Answer)
 
-    def _get(self, key: str, payload: bytes, timeout_s: float) -> zenoh.Reply | None:
-        """One query: its first reply, None if nobody is there."""
+    def _get(self, key: str, payload: bytes, timeout_s: float) -> Answer | str | None:
+        """One query: its first answer, or why it is refused; None if nobody is there."""
+        nonce = secrets.randbits(NONCE_BITS)
+        options: dict[str, Any] = {"payload": payload, "attachment": Attachment(0, nonce, 0).to_bytes()}
         try:
-            handler = self._session.get(self._key(key), FifoChannel(4), payload=payload, timeout=timeout_s)
+            handler = self._session.get(self._key(key), FifoChannel(4), timeout=timeout_s, **options)
         except zenoh.ZError as error:
             if not self._connection.closed:
                 return None  # its session is just being replaced
@@ -373,9 +412,17 @@ class Bus:
                 reply = handler.try_recv()
             except zenoh.ZError:  # the channel is empty and closed: all replies are in
                 return None
-            if reply is not None:
-                return reply
-            time.sleep(POLL_S)
+            if reply is None:
+                time.sleep(POLL_S)
+            elif reply.err is not None:
+                return bytes(reply.err.payload).decode(errors="replace")
+            elif reply.ok is not None and (sent := _attachment(reply.ok)) is not None and sent.seq == nonce:
+                return Answer(bytes(reply.ok.payload), sent.epoch)
+
+    @property
+    def trouble(self) -> str:
+        """Why nobody can connect to this bus although it listens, "" if they can."""
+        return self._connection.trouble
 
     def peers(self) -> int:
         """How many others are connected."""
@@ -387,8 +434,9 @@ class Bus:
 
     def short_peers(self) -> int:
         """How many peers have less than two links, so that their UDP does not get through. Watchers need but one."""
-        counts = Counter(str(link.zid) for link in self._session.info.links())
-        return sum(counts[str(zid)] < LINKS_PER_PEER for zid in self._session.info.peers_zid())
+        session = self._session
+        counts = Counter(str(link.zid) for link in session.info.links())
+        return sum(counts[str(zid)] < LINKS_PER_PEER for zid in session.info.peers_zid())
 
     def close(self, timeout_s: float = CLOSE_S) -> bool:
         """Close the session; False if a dead link kept it from closing in time. May be called twice."""
@@ -398,8 +446,25 @@ class Bus:
     def _session(self) -> zenoh.Session:
         return self._connection.session
 
+    def _keys_changed(self) -> bool:
+        return self._keys is not None and self._keys.changed()
+
+    def _read_keys(self) -> Keys | None:
+        """Those with which to listen from now on. Raises `ConfigError`."""
+        if self._keys is not None and self._keys.changed():
+            self._keys = load_keys(self._keys.folder)
+        return self._keys
+
+    def _own(self, topic: Topic[M]) -> Topic[M]:
+        """A topic as this peer may put it: commands go in its own name."""
+        return named(topic, self.name) if self.name and topic in COMMANDS else topic
+
     def _key(self, key: str) -> str:
         return f"{self._prefix}/{key}" if self._prefix else key
+
+
+def _attachment(carrier: zenoh.Query | zenoh.Sample) -> Attachment | None:
+    return parse_attachment(None if carrier.attachment is None else bytes(carrier.attachment))
 
 
 def _is_loopback(endpoint: str) -> bool:

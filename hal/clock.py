@@ -34,6 +34,11 @@ class ClockEstimate:
         """Whether the robot was ever heard."""
         return bool(self._offsets)
 
+    @property
+    def epoch(self) -> int | None:
+        """The session of the robot that is listened to, None before any was heard."""
+        return self._epoch
+
     def hear(self, epoch: int, sent_s: float, local_s: float) -> bool:
         """As `note`, for a message that names its sender's session. False if it is not of the robot listened to.
 

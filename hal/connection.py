@@ -8,6 +8,9 @@ dropped as old ones, or as nobody's, and both say that all links are up. That do
 
 So whoever connects comes back as somebody else: with a new session, and so a new id. What the other end has of the old
 one dies with its lease.
+
+Whoever listens begins a new session, too, when its keys change: zenoh reads who may do what once, and nothing but the
+end of the old session ends the links of those who may not have them any more.
 """
 
 import contextlib
@@ -20,11 +23,13 @@ from weakref import WeakSet
 import zenoh
 from zenoh.handlers import RingChannel
 
-from hal.errors import BusError
+from hal.errors import BusError, LiraError
 
 T = TypeVar("T")
 LOOK_S = 0.05
 RETRY_S = 0.2
+STALE_S = 0.5
+CLOSING_S = 2.0
 EVENTS = 64  # more links than ever are lost between two looks
 
 
@@ -44,19 +49,30 @@ class Connection:
     """A session, and what is declared on it.
 
     With `connect` a thread keeps connected: it opens sessions with that until one is up, and another when a link of it
-    is lost. Meanwhile there is an `idle` one, which is connected to nobody: what is put then is lost, like anything
-    else on a link that broke, and nobody waits.
+    is lost. With `listen` the first session comes from that, and its failure is raised here; a thread opens another
+    whenever `stale` says so. Meanwhile there is an `idle` one, which is connected to nobody: what is put then is lost,
+    like anything else on a link that broke, and nobody waits. `trouble` says why the next is not up yet, "" otherwise.
     """
 
-    def __init__(self, idle: Callable[[], zenoh.Session], connect: Callable[[], zenoh.Session] | None = None) -> None:
+    def __init__(
+        self,
+        idle: Callable[[], zenoh.Session],
+        connect: Callable[[], zenoh.Session] | None = None,
+        listen: Callable[[], zenoh.Session] | None = None,
+        stale: Callable[[], bool] | None = None,
+    ) -> None:
         self._idle = idle
-        self.session = idle()
+        self.trouble = ""
+        self.session = idle() if listen is None else listen()
         self._declared: WeakSet[Declared[Any]] = WeakSet()  # what nobody uses any more is not declared again
         self._lock = threading.Lock()  # over the session and what is declared on it
         self._closed, self._up = threading.Event(), threading.Event()
         self._threads: list[threading.Thread] = []  # that may be inside zenoh
+        self._leaving: threading.Thread | None = None  # closes the session before this one
         if connect is not None:
             self._begin(self._keep, connect)
+        if listen is not None and stale is not None:
+            self._begin(self._keep_listening, listen, stale)
 
     @property
     def closed(self) -> bool:
@@ -87,11 +103,12 @@ class Connection:
             thread.join(max(0.0, until_s - time.monotonic()))
         return not any(thread.is_alive() for thread in self._threads)
 
-    def _begin(self, work: Callable[..., None], *arguments: Any) -> None:
+    def _begin(self, work: Callable[..., None], *arguments: Any) -> threading.Thread:
         self._threads = [thread for thread in self._threads if thread.is_alive()]
         thread = threading.Thread(target=work, args=arguments, name=f"bus{work.__name__}", daemon=True)
         thread.start()
         self._threads.append(thread)
+        return thread
 
     def _keep(self, connect: Callable[[], zenoh.Session]) -> None:
         while not self._closed.is_set():
@@ -111,6 +128,31 @@ class Connection:
                     with contextlib.suppress(BusError):  # then the lost one stays until the next is up
                         self._replace(self._idle())
                     break
+
+    def _keep_listening(self, listen: Callable[[], zenoh.Session], stale: Callable[[], bool]) -> None:
+        while not self._closed.wait(STALE_S):
+            if not self.trouble and not stale():
+                continue
+            if not self.trouble:
+                self._let_all_go()
+            try:
+                session = listen()
+            except LiraError as error:
+                self.trouble = str(error)
+            else:
+                self.trouble = "" if self._replace(session) else "the session ended as it began"
+
+    def _let_all_go(self) -> None:
+        """End all links, so that the address is free. Whatever it takes: some of them may be there no longer."""
+        before = self.session
+        try:
+            idle = self._idle()
+        except BusError:  # a crowd holds all descriptors
+            _let_go(before)
+        else:
+            self._replace(idle)
+            if self._leaving is not None:
+                self._leaving.join(CLOSING_S)
 
     def _replace(self, session: zenoh.Session) -> bool:
         """Go on with another session; returns whether all that was declared is declared on it.
@@ -137,7 +179,7 @@ class Connection:
         """Close a session, which may take long while links are dead: beside, unless `close` waits for it here."""
         with self._lock:
             if beside := not self._closed.is_set():
-                self._begin(_let_go, session)
+                self._leaving = self._begin(_let_go, session)
         if not beside:
             _let_go(session)
 

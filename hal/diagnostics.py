@@ -8,12 +8,13 @@ from hal.arming import State
 from hal.bus import Bus
 from hal.governed import GovernedRobot
 from hal.messages import DiagnosticArray, DiagnosticStatus
-from hal.refusals import LINK
+from hal.refusals import FULL, LINK
 from hal.topics import DIAGNOSTICS
 
 OK, WARN = 0, 1
 PATIENCE_S = 3.0  # a peer that has just come has one link for a moment
 NO_DATAGRAMS = "UDP does not get through: over TCP alone commands queue up in a gap of the radio (check the firewall)"
+CROWD = "no more files may be opened, so nobody can connect: does somebody hold connections open? (see ulimit -n)"
 STRANGER = "somebody without a valid certificate tries to connect (counted on diagnostics; see lira keys show)"
 
 
@@ -43,19 +44,26 @@ class Reporter:
         self._publisher = bus.publisher(DIAGNOSTICS)
         self._said = ""
         self._strangers = False
+        self._full = 0
 
     def run(self, stop: threading.Event) -> None:
         """Report until `stop` is set."""
         if self._robot.field_off:
             print(f"{self._bus.robot}: {self._robot.field_off}", file=sys.stderr, flush=True)
         while not stop.wait(1.0 / DIAGNOSTICS.rate_hz):
-            trouble = self._watch.look(self._bus.short_peers(), time.monotonic())
+            trouble = self._trouble(time.monotonic())
             if trouble and trouble != self._said:
                 print(f"{self._bus.robot}: {trouble}", file=sys.stderr, flush=True)
             self._said = trouble
             self._tell_of_strangers()
             now_s = self._robot.now()
             self._publisher.put(DiagnosticArray(now_s, (self._governor(), self._link(trouble))), now_s)
+
+    def _trouble(self, now_s: float) -> str:
+        """What is wrong with the links: the worst of it, "" for nothing."""
+        full, self._full = self._full, self._bus.refusals.counts[FULL]
+        slow = self._watch.look(self._bus.short_peers(), now_s)
+        return self._bus.trouble or (CROWD if self._full > full else "") or slow
 
     def _tell_of_strangers(self) -> None:
         """Say so when the first link is refused: it may well be the owner's, with keys that have expired."""

@@ -1,19 +1,20 @@
-"""The emergency stop over the bus: a query that is acknowledged, beside the latched topic that a ROS peer may use.
+"""The emergency stop over the bus: queries that are acknowledged, beside the latched topic that a ROS peer may use.
 
-Anybody may press. `True` on the topic presses; only the query releases, so that a peer which repeats its idle state
+To press, to release and to look are keys of their own, so that with keys each is a permission of its own: anybody may
+press and look. `True` on the topic presses; only the query releases, so that a peer which repeats its idle state
 releases nothing. The robot stays at zero until a neutral command comes after the release.
 """
 
 import threading
+from collections.abc import Callable
 
 import msgspec
 
-from hal.bus import Bus, Question
+from hal.bus import Bus, Question, Questions
 from hal.errors import BusError
 from hal.governed import GovernedRobot
-from hal.topics import ESTOP_QUERY
+from hal.topics import ESTOP_LOOK, ESTOP_PRESS, ESTOP_RELEASE
 
-PRESS, RELEASE, LOOK = b"press", b"release", b""
 LOOK_S = 0.005
 ANSWER_S = 2.0
 
@@ -35,7 +36,9 @@ class EstopDesk:
 
     def __init__(self, robot: GovernedRobot, bus: Bus) -> None:
         self._robot = robot
-        self._asked = bus.questions(ESTOP_QUERY)
+        self._pressed = bus.questions(ESTOP_PRESS)
+        self._released = bus.questions(ESTOP_RELEASE)
+        self._looked = bus.questions(ESTOP_LOOK)
 
     def run(self, stop: threading.Event) -> None:
         """Answer until `stop` is set."""
@@ -43,38 +46,40 @@ class EstopDesk:
             self.serve()
 
     def serve(self) -> None:
-        """Do and answer what was asked since the last time."""
-        self._asked.serve(self._answer)
+        """Do and answer what was asked since the last time. What is pressed together with a release stays pressed."""
+        self._serve(self._released, self._robot.release_estop)
+        self._serve(self._pressed, self._robot.press_estop)
+        self._serve(self._looked, lambda: None)
 
-    def _answer(self, question: Question) -> None:
-        if question.payload == PRESS:
-            self._robot.press_estop()
-        elif question.payload == RELEASE:
-            self._robot.release_estop()
-        elif question.payload != LOOK:
-            question.refuse(f"say {PRESS.decode()} or {RELEASE.decode()}, or nothing to look")
-            return
-        question.answer(msgspec.json.encode(EstopState(self._robot.state, self._robot.refused)))
+    def _serve(self, asked: Questions, act: Callable[[], object]) -> None:
+        def answer(question: Question) -> None:
+            act()
+            question.answer(msgspec.json.encode(EstopState(self._robot.state, self._robot.refused)))
 
-
-def press_estop(bus: Bus, timeout_s: float = ANSWER_S) -> EstopState:
-    """Stop the robot and wait for its acknowledgement. Raises `BusError` if none comes: then assume that it moves."""
-    return _ask(bus, PRESS, timeout_s)
+        asked.serve(answer)
 
 
-def release_estop(bus: Bus, timeout_s: float = ANSWER_S) -> EstopState:
-    """Let the robot go, which then waits for a neutral command. Raises `BusError`."""
-    return _ask(bus, RELEASE, timeout_s)
+def press_estop(bus: Bus, timeout_s: float = ANSWER_S, epoch: int | None = None) -> EstopState:
+    """Stop the robot and wait for its acknowledgement. Raises `BusError` if none comes: then assume that it moves.
+
+    With `epoch` only the robot of that session acknowledges: the one that the caller hears.
+    """
+    return _ask(bus, ESTOP_PRESS, timeout_s, epoch)
+
+
+def release_estop(bus: Bus, timeout_s: float = ANSWER_S, epoch: int | None = None) -> EstopState:
+    """Let the robot go, which then waits for a neutral command. Raises `BusError`, also for who may not release."""
+    return _ask(bus, ESTOP_RELEASE, timeout_s, epoch)
 
 
 def look_at_estop(bus: Bus, timeout_s: float = ANSWER_S) -> EstopState:
     """Ask how it stands. Raises `BusError`."""
-    return _ask(bus, LOOK, timeout_s)
+    return _ask(bus, ESTOP_LOOK, timeout_s, None)
 
 
-def _ask(bus: Bus, payload: bytes, timeout_s: float) -> EstopState:
-    answer = bus.ask(ESTOP_QUERY, payload, timeout_s)
+def _ask(bus: Bus, key: str, timeout_s: float, epoch: int | None) -> EstopState:
+    answer = bus.answer(key, timeout_s=timeout_s, epoch=epoch)
     try:
-        return msgspec.json.decode(answer, type=EstopState)
+        return msgspec.json.decode(answer.payload, type=EstopState)
     except msgspec.MsgspecError as error:
-        raise BusError(f"the robot answers '{ESTOP_QUERY}' with what is not understood: {error}") from error
+        raise BusError(f"the robot answers '{key}' with what is not understood: {error}") from error

@@ -16,7 +16,7 @@ from dataclasses import replace
 from hal.arming import TRANSITIONS, Event, State
 from hal.clock import AHEAD_S
 from hal.field import Clearance, limit_speed
-from hal.lease import Lease
+from hal.lease import Lease, Token, session_of
 from hal.messages import STOP, Applied, Command, Reason, Source, Twist
 from hal.profile import RobotProfile
 
@@ -45,7 +45,7 @@ class Governor:
         self._live: dict[Source, Command] = {}
         self._newest: dict[Source, Command] = {}  # as it was stamped: what came before it from there is out of order
         self._not_before_s = -math.inf  # what was sent before the emergency stop was released does not count
-        self._cut_off: int | None = None  # the hand (its epoch) that moved at the stop or since, until it is at zero
+        self._cut_off: Token | None = None  # the hand that moved at the stop or since, until it is at zero itself
         self._lost: tuple[str, ...] = ()
         self._losses = 0
         self._state, self._reason = State.DISARMED, Reason.NO_COMMAND
@@ -88,7 +88,10 @@ class Governor:
         if command is None:
             return Applied(twist, now_s, source, reason, clamps)
         age_s = now_s - command.stamp_s
-        return Applied(twist, now_s, source, reason, clamps, command.answers, age_s, command.epoch, command.seq)
+        session = session_of(command.epoch)
+        return Applied(
+            twist, now_s, source, reason, clamps, command.answers, age_s, session, command.seq, command.commander
+        )
 
     def note_devices(self, lost: tuple[str, ...], losses: int) -> None:
         """Take in which devices are lost now, and how many losses there ever were: one between two looks counts too."""
@@ -119,7 +122,7 @@ class Governor:
             return
         hand = self._live.get(Source.TELEOP)
         if hand is not None and not is_neutral(hand.twist):
-            self._cut_off = hand.epoch
+            self._cut_off = hand.token
         self._live = {source: replace(command, twist=STOP) for source, command in self._live.items()}
 
     def _objection(self, command: Command, now_s: float) -> str | None:
@@ -132,23 +135,23 @@ class Governor:
             return "from the future"
         newest = self._newest.get(command.source)
         # One commander's clock, which may run ahead, does not put another's commands out of order.
-        in_order = newest is None or newest.epoch != command.epoch or command.stamp_s >= newest.stamp_s
+        in_order = newest is None or newest.token != command.token or command.stamp_s >= newest.stamp_s
         if not in_order or command.stamp_s < self._not_before_s:
             return "out of order"
         if now_s - command.stamp_s >= timeout_s - ROUNDING_S:
             return "late"
-        return self._leases[command.source].objection(command.epoch, now_s)
+        return self._leases[command.source].objection(command.token, now_s)
 
     def _accept(self, command: Command, now_s: float) -> None:
         twist = STOP if command.released else command.twist
         taken = replace(command, twist=twist, stamp_s=min(command.stamp_s, now_s))
-        if command.source is Source.TELEOP and is_neutral(twist) and command.epoch == self._cut_off:
+        if command.source is Source.TELEOP and is_neutral(twist) and command.token == self._cut_off:
             self._cut_off = None
         if command.released:
             self._let_go(command, taken)
             return
         self._newest[command.source] = command
-        self._leases[command.source].renew(command.epoch, now_s)
+        self._leases[command.source].renew(command.token, now_s)
         self._live[command.source] = taken
         if self._in_charge() is taken:
             self._fire(self._event_of(taken))
@@ -157,7 +160,7 @@ class Governor:
         """What it means that who is in charge commands this."""
         if is_neutral(command.twist):
             return Event.NEUTRAL
-        cut_off = command.source is Source.TELEOP and command.epoch == self._cut_off
+        cut_off = command.source is Source.TELEOP and command.token == self._cut_off
         return Event.RESUMED if cut_off else Event.MOTION
 
     def _let_go(self, command: Command, taken: Command) -> None:

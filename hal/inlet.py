@@ -1,13 +1,15 @@
 """What a HAL server takes in: commands, as they came."""
 
 from collections import OrderedDict
+from collections.abc import Hashable
 
 from hal.attachment import Attachment
-from hal.bus import Bus, Reader, Received
+from hal.bus import Bus, Received
 from hal.governor import is_neutral
 from hal.messages import Command, Source, Twist
-from hal.topics import CMD_VEL, ESTOP, TELEOP, Topic
+from hal.topics import CMD_VEL, ESTOP, TELEOP, Topic, commander_of, named
 
+EPOCHS = 1 << 64
 DEPTH = 32  # a neutral command must not be lost under the motion that follows it
 ESTOP_DEPTH = 256
 SESSIONS = 256  # whose count is remembered
@@ -18,15 +20,15 @@ class Order:
     """Tells what was sent before something else of the same session, or for the second time. Pure."""
 
     def __init__(self) -> None:
-        self._highest: OrderedDict[int, int] = OrderedDict()
+        self._highest: OrderedDict[Hashable, int] = OrderedDict()
 
-    def is_new(self, sent: Attachment) -> bool:
+    def is_new(self, session: Hashable, seq: int) -> bool:
         """Whether nothing that was sent later in its session came before it; remembers it."""
-        highest = self._highest.pop(sent.epoch, -1)
-        self._highest[sent.epoch] = max(highest, sent.seq)
+        highest = self._highest.pop(session, -1)
+        self._highest[session] = max(highest, seq)
         if len(self._highest) > SESSIONS:
             self._highest.popitem(last=False)
-        return sent.seq > highest
+        return seq > highest
 
 
 class Inlet:
@@ -52,16 +54,20 @@ class Inlet:
         The bus shows a latched message again to whoever reconnects: what was seen once does not press twice. So many
         messages at once that one may have been lost count as a press: it may have been that one.
         """
-        came = self._estop.poll()
-        new = [received for received in came if received.attachment is None or self._seen.is_new(received.attachment)]
+        new = [received for received in self._estop.poll() if self._is_new(received.attachment)]
         return self._estop.full or any(received.message.data for received in new)
+
+    def _is_new(self, sent: Attachment | None) -> bool:
+        return sent is None or self._seen.is_new(sent.epoch, sent.seq)
 
 
 class _Commands:
     """One of the command topics."""
 
     def __init__(self, bus: Bus, topic: Topic[Twist], source: Source) -> None:
-        self._reader: Reader[Twist] = bus.reader(topic, DEPTH)
+        # The plain topic, on which ROS bridges command too, and with keys those that carry a name.
+        topics = [topic, named(topic, "*")] if bus.encrypted else [topic]
+        self._readers = [bus.reader(each, DEPTH) for each in topics]
         self._boundary = bus.boundary
         self._key = topic.key
         self._source = source
@@ -69,26 +75,36 @@ class _Commands:
 
     def take(self, now_s: float) -> list[Command]:
         """Return what came since the last time, oldest first."""
-        came = self._reader.poll()
+        came = [received for reader in self._readers for received in reader.poll()]
         bare = sum(received.attachment is None for received in came)
         if bare >= BURST:
             # These are judged by when they come, and what a link has held back for seconds comes all at once.
             self._boundary.refuse(self._key, "burst", bare)
             came = [received for received in came if received.attachment is not None]
-        return [self._command(received, now_s) for received in came if self._is_new(received)]
+        commands = [self._command(received, now_s) for received in came if self._has_sender(received)]
+        return [command for command in commands if self._is_new(command)]
 
-    def _is_new(self, received: Received[Twist]) -> bool:
-        new = received.attachment is None or self._order.is_new(received.attachment)
-        if not new:
-            self._boundary.refuse(self._key, "out of order")
-        return new
+    def _has_sender(self, received: Received[Twist]) -> bool:
+        """Whether there is anything to tell whose it is."""
+        if received.attachment is None and not received.sender:
+            self._boundary.refuse(self._key, "no sender")
+            return False
+        return True
+
+    def _is_new(self, command: Command) -> bool:
+        """Whether its number grows; a peer without attachments has none."""
+        if command.seq < 0 or self._order.is_new(command.token, command.seq):
+            return True
+        self._boundary.refuse(self._key, "out of order")
+        return False
 
     def _command(self, received: Received[Twist], now_s: float) -> Command:
         """Its time is the sender's. A sample without our attachment (a ROS peer's) is judged by its arrival, and its
-        hand lets go with a zero: it cannot say so in another way.
+        hand lets go with a zero: it cannot say so in another way. Such peers are told apart by the id of their session.
         """
-        twist, sent = received.message, received.attachment
+        twist, sent, commander = received.message, received.attachment, commander_of(received.key)
         if sent is None:
             released = self._source is Source.TELEOP and is_neutral(twist)
-            return Command(twist, now_s, self._source, released=released)
-        return Command(twist, sent.time_s, self._source, sent.answers, sent.released, sent.epoch, sent.seq)
+            epoch = int(received.sender, 16) % EPOCHS
+            return Command(twist, now_s, self._source, released=released, epoch=epoch, commander=commander)
+        return Command(twist, sent.time_s, self._source, sent.answers, sent.released, sent.epoch, sent.seq, commander)

@@ -1,14 +1,22 @@
 """The lease: one commander at a time. Pure; every time is on the robot's clock.
 
-A commander's token is the epoch of its session. Its first command takes a free lease and every further one renews it.
-It ends when the commander says so, or `ttl_s` after its last command. Whoever lost it by silence to another does not
-get it back in the same session: what is still on its way from there is old.
+A commander's token is its name, which an access list vouches for where there are keys, with the epoch of its session,
+which it keeps to itself. Its first command takes a free lease and every further one renews it. It ends when the
+commander says so, or `ttl_s` after its last command. Whoever lost it by silence to another does not get it back in the
+same session: what is still on its way from there is old.
 """
 
+import hashlib
 import math
 from collections import deque
 
 REMEMBERED = 64  # sessions that lost the lease
+Token = tuple[str, int]
+
+
+def session_of(epoch: int) -> int:
+    """What may be told of an epoch (64 bits) to everybody: who has it knows it again, and nobody gets it from there."""
+    return int.from_bytes(hashlib.blake2b(epoch.to_bytes(8, "little"), digest_size=8).digest(), "little")
 
 
 class Lease:
@@ -16,23 +24,23 @@ class Lease:
 
     def __init__(self, ttl_s: float) -> None:
         self._ttl_s = ttl_s
-        self._holder: int | None = None
+        self._holder: Token | None = None
         self._until_s = -math.inf
-        self._lost: deque[int] = deque(maxlen=REMEMBERED)
+        self._lost: deque[Token] = deque(maxlen=REMEMBERED)
 
-    def objection(self, epoch: int, now_s: float) -> str | None:
+    def objection(self, token: Token, now_s: float) -> str | None:
         """Say why this commander may not command now; None if it may."""
-        if epoch in self._lost:
+        if token in self._lost:
             return "old epoch"
-        if self._holder not in (None, epoch) and now_s < self._until_s:
+        if self._holder not in (None, token) and now_s < self._until_s:
             return "another commander"
         return None
 
-    def renew(self, epoch: int, now_s: float) -> None:
+    def renew(self, token: Token, now_s: float) -> None:
         """Give it to a commander to which there is no objection."""
-        if self._holder is not None and self._holder != epoch:
+        if self._holder is not None and self._holder != token:
             self._lost.append(self._holder)
-        self._holder = epoch
+        self._holder = token
         self._until_s = now_s + self._ttl_s
 
     def release(self) -> None:

@@ -66,7 +66,8 @@ class Command:
 
     `stamp_s` is when it was decided, `answers` the sequence number of the observation it answers (-1: none).
     `released` marks the last command of a commander: the teleop command that follows the release of the dead-man (the
-    wheel goes back to the policy), or a policy's farewell. `epoch` is the commander's session and `seq` its count.
+    wheel goes back to the policy), or a policy's farewell. `commander` is the name on the certificate of whoever
+    commands, "" without keys; `epoch` is their session, which they keep to themselves, and `seq` its count.
     """
 
     twist: Twist
@@ -76,13 +77,20 @@ class Command:
     released: bool = False
     epoch: int = 0
     seq: int = -1
+    commander: str = ""
+
+    @property
+    def token(self) -> tuple[str, int]:
+        """Who commands: the name, and the session, which nobody else knows."""
+        return self.commander, self.epoch
 
 
 @dataclass(frozen=True, slots=True)
 class Applied:
     """What the base really got, from whom, and why (`cmd_vel/applied`).
 
-    `epoch` and `seq` name the command it came from, `command_age_s` says how old that was.
+    `commander`, `session` and `seq` name the command it came from, `command_age_s` says how old that was. `session` is
+    a digest of the commander's epoch (`hal.lease.session_of`): it knows its own by that, and nobody learns the epoch.
     """
 
     twist: Twist
@@ -92,8 +100,9 @@ class Applied:
     clamps: tuple[str, ...] = ()
     answers: int = -1
     command_age_s: float = float("nan")
-    epoch: int = 0
+    session: int = 0
     seq: int = -1
+    commander: str = ""
 
 
 @dataclass(frozen=True, slots=True)

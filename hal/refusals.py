@@ -1,4 +1,5 @@
-"""What zenoh refuses before anybody here sees it: links without a valid certificate, messages nobody may send.
+"""What zenoh refuses before anybody here sees it: links without a valid certificate, links when this process may open
+no more files, messages nobody may send.
 
 zenoh tells of that in its log alone, and writes that to standard output. So it gets a descriptor 1 of its own, and what
 the log says is counted. Neither a full pipe nor a reader that died holds zenoh up: what does not fit is lost.
@@ -15,7 +16,7 @@ import zenoh
 
 from hal.keys import keys_from_environment
 
-LINK, MESSAGE = "links", "messages"
+LINK, FULL, MESSAGE = "links", "links for want of files", "messages"
 # One line for each link that its acceptor gave up, one for each message that the access list stopped, nothing else.
 FILTER = (
     "off,zenoh_link_tls=warn,zenoh_link_commons=warn,"
@@ -23,16 +24,16 @@ FILTER = (
 )
 VARIABLE = "RUST_LOG"
 _LINK = re.compile(rb"zenoh_link_\S+: .*Hint: increase the system open file limit")
-_NOT_THEIRS = b"Too many open files"
+_FULL = b"Too many open files"
 _MESSAGE = re.compile(rb"zenoh::net::routing::interceptor: Msg intercepted")
 LONGEST = 65536
 
 
 class Refusals:
-    """Counts what zenoh's log says, by kind: `links` and `messages`. Pure; `feed` takes the log as it comes."""
+    """Counts what zenoh's log says, by kind. Pure; `feed` takes the log as it comes."""
 
     def __init__(self) -> None:
-        self._counts = Counter({LINK: 0, MESSAGE: 0})
+        self._counts = Counter({LINK: 0, FULL: 0, MESSAGE: 0})
         self._rest = b""
 
     @property
@@ -47,10 +48,14 @@ class Refusals:
         return [line for line in lines if not self._count(line)]
 
     def _count(self, line: bytes) -> bool:
-        kind = MESSAGE if _MESSAGE.search(line) else LINK if _LINK.search(line) and _NOT_THEIRS not in line else None
-        if kind is not None:
-            self._counts[kind] += 1
-        return kind is not None
+        if _MESSAGE.search(line):
+            kind = MESSAGE
+        elif _LINK.search(line):
+            kind = FULL if _FULL in line else LINK
+        else:
+            return False
+        self._counts[kind] += 1
+        return True
 
 
 def count_refusals() -> Refusals:

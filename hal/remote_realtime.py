@@ -20,6 +20,7 @@ from hal.bus import Bus, Publisher
 from hal.clock import ClockEstimate
 from hal.errors import BusError
 from hal.governor import is_neutral
+from hal.lease import session_of
 from hal.messages import HELD, STOP, Applied, Command, CourseState, Observation, Reason, Source, Twist
 from hal.senses import Sense, Senses
 from hal.topics import APPLIED, CMD_VEL, SIM_STATE, TELEOP
@@ -46,7 +47,7 @@ class RealTimeLink:
         self._publishers = {Source.POLICY: bus.publisher(CMD_VEL), Source.TELEOP: bus.publisher(TELEOP)}
         self._clock = ClockEstimate()
         self._epoch = NOBODY  # of the robot that is listened to
-        self._own_epoch = bus.epoch
+        self._own = session_of(bus.epoch)
         self._newest: Applied | None = None
         self._untold = False  # the robot has stopped by itself, and whoever drives here has not heard of it
         self._held: dict[Source, Command] = {}
@@ -140,7 +141,7 @@ class RealTimeLink:
             if newest is None or now_s - newest.stamp_s > APPLIED.max_age_s:
                 return Applied(STOP, now_s)
             self._untold = False
-        if Source.POLICY == command.source == newest.source and newest.epoch != self._own_epoch:
+        if Source.POLICY == command.source == newest.source and newest.session != self._own:
             return Applied(STOP, newest.stamp_s, reason=Reason.REFUSED)  # somebody else drives
         return newest
 

@@ -6,16 +6,19 @@ when its stream is up, or not at all; the datagrams follow in the background, as
 """
 
 import json
+import resource
 
 import zenoh
 
-from hal.errors import BusError
+from hal.access import access_list
+from hal.errors import BusError, ConfigError
 from hal.keys import Keys
-from hal.topics import ATTACHMENT_BYTES, MESSAGE_BYTES, QUESTION_BYTES, TOPICS
+from hal.topics import ATTACHMENT_BYTES, COMMANDS, MESSAGE_BYTES, QUESTION_BYTES, TOPICS, named
 
 LEASE_MS = 2000
 OPEN_MS = 2000
 CONNECT_MS = 3000
+FILES = 65536
 
 
 def open_session(
@@ -29,10 +32,18 @@ def open_session(
 ) -> zenoh.Session:
     """Open one; the arguments are those of `hal.bus.Bus`. With neither address it is connected to nobody.
 
-    What is longer than its topic allows ends here: neither is it put together nor does it wait in a queue.
+    What is longer than its topic allows ends here: neither is it put together nor does it wait in a queue. Whoever
+    listens is a robot, and lets others do what `hal/access.py` says. Whoever connects hears the robot alone.
 
-    Raises `BusError`: if it does not connect, after `CONNECT_MS` at the latest.
+    Raises `BusError`: if it does not connect, after `CONNECT_MS` at the latest; `ConfigError`: to listen with keys that
+    are no robot's.
     """
+    if listen is not None and keys is not None and keys.roles is None:
+        raise ConfigError(
+            f"{keys.folder} holds the keys of {keys.name}, which is no robot", "Use the bundle made for the robot."
+        )
+    if listen is not None:
+        _make_room()
     config = zenoh.Config()
     for key, value in {
         # Both ends are peers: a client would use one link only. What peers say is passed on to clients alone.
@@ -58,7 +69,8 @@ def open_session(
         "transport/shared_memory/enabled": False,
         # Late readers of a latched topic are served by its time stamp.
         "timestamping/enabled": True,
-        **({} if keys is None else keys.zenoh_config(robot)),
+        **({} if keys is None else {"transport/link/tls": keys.link_config()}),
+        **({} if listen is None else {"access_control": access_list(robot, None if keys is None else keys.roles)}),
     }.items():
         config.insert_json5(key, json.dumps(value))
     try:
@@ -76,9 +88,18 @@ def open_session(
         ) from error
 
 
+def _make_room() -> None:
+    """Let this process open as many files as it may: whoever comes, with keys or without, holds one for a while."""
+    soft, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
+    wanted = FILES if hard == resource.RLIM_INFINITY else min(FILES, hard)
+    if soft != resource.RLIM_INFINITY and soft < wanted:
+        resource.setrlimit(resource.RLIMIT_NOFILE, (wanted, hard))
+
+
 def _size_limits(prefix: str) -> list[dict[str, object]]:
     """How long a message that comes may be, by key."""
-    limits = {topic.key: topic.max_bytes + ATTACHMENT_BYTES for topic in TOPICS}
+    topics = (*TOPICS, *(named(topic, "*") for topic in COMMANDS))
+    limits = {topic.key: topic.max_bytes + ATTACHMENT_BYTES for topic in topics}
     rules = [(["put"], f"{prefix}/{key}".lstrip("/"), limit) for key, limit in limits.items()]
     rules.append((["query"], "**", QUESTION_BYTES + ATTACHMENT_BYTES))
     return [

@@ -3,7 +3,7 @@
 Keys lie below the robot's name. Whether a value is fresh is decided from this table and nowhere else.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Generic, TypeVar
 
 from zenoh import Priority, Reliability
@@ -127,7 +127,35 @@ TOPICS: tuple[Topic[Any], ...] = (
     CLOCK,
 )
 
-# Keys that answer queries.
+COMMANDS: tuple[Topic[Twist], ...] = (CMD_VEL, TELEOP)
+# What operators tell; all else on the bus, but commands, the robot says alone.
+FROM_OPERATORS: tuple[Topic[Any], ...] = (
+    ESTOP,
+    JOY,
+    JOY_FEEDBACK,
+    OPERATOR,
+    OPERATOR_ANSWER,
+    DECISION,
+    DIAGNOSTICS,
+)
+
+
+_BY = "/by/"
+
+
+def named(topic: Topic[M], commander: str) -> Topic[M]:
+    """A topic of commands as one commander has it: with keys everybody commands in their own name, and in no other."""
+    return replace(topic, key=f"{topic.key}{_BY}{commander}")
+
+
+def commander_of(key: str) -> str:
+    """Whose command came on a key, "" on a plain one."""
+    return key.rpartition(_BY)[2] if _BY in key else ""
+
+
+# Keys that answer queries. What is a permission of its own is a key of its own.
 INFO = "info"
 RESET = "sim/reset"
-ESTOP_QUERY = "estop/ask"
+ESTOP_PRESS = "estop/press"
+ESTOP_RELEASE = "estop/release"
+ESTOP_LOOK = "estop/look"

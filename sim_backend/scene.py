@@ -13,7 +13,7 @@ import sys
 import tempfile
 from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from functools import partial
 from itertools import groupby
 from pathlib import Path
@@ -54,23 +54,35 @@ def import_pybullet() -> ModuleType:
 
 @contextmanager
 def quiet() -> Iterator[None]:
-    """Keep what pybullet prints from C off the screen and out of a report that a program reads."""
+    """Keep what pybullet prints from C off the screen and out of a report that a program reads.
+
+    A process that may open no more files is not quiet, but goes on.
+    """
     libc = ctypes.CDLL(None)
     sys.stdout.flush()
     sys.stderr.flush()
     libc.fflush(None)
-    kept = [os.dup(stream) for stream in (1, 2)]
-    nowhere = os.open(os.devnull, os.O_WRONLY)
-    try:
-        for stream in (1, 2):
-            os.dup2(nowhere, stream)
-        yield
-    finally:
-        libc.fflush(None)
-        for stream, copy in zip((1, 2), kept, strict=True):
-            os.dup2(copy, stream)
-            os.close(copy)
-        os.close(nowhere)
+    with ExitStack() as stack:
+        try:
+            kept = [_open(stack, os.dup, stream) for stream in (1, 2)]
+            nowhere = _open(stack, os.open, os.devnull, os.O_WRONLY)
+        except OSError:
+            yield
+            return
+        try:
+            for stream in (1, 2):
+                os.dup2(nowhere, stream)
+            yield
+        finally:
+            libc.fflush(None)
+            for stream, copy in zip((1, 2), kept, strict=True):
+                os.dup2(copy, stream)
+
+
+def _open(stack: ExitStack, opener: Callable[..., int], *words: object) -> int:
+    descriptor = opener(*words)
+    stack.callback(os.close, descriptor)
+    return descriptor
 
 
 class Scene:

@@ -33,8 +33,9 @@ def _applied_to(m: Applied) -> Any:
         list(m.clamps),
         m.answers,
         m.command_age_s,
-        m.epoch,
+        m.session,
         m.seq,
+        m.commander,
     )
 
 
@@ -47,8 +48,9 @@ def _applied_from(message: Any) -> Applied:
         tuple(message.clamps),
         message.answers,
         message.command_age_s,
-        message.epoch,
+        message.session,
         message.seq,
+        message.commander,
     )
 
 

@@ -1,13 +1,11 @@
 """The emergency stop over the bus, and one commander at a time."""
 
-import pytest
 from wiring import StuckRobot, joined, real_time_null, remote, served, wait_for
 
-from hal.errors import BusError
 from hal.estop import look_at_estop, press_estop, release_estop
 from hal.messages import STOP, Bool, Command, Reason, Twist
 from hal.null import NullRobot
-from hal.topics import ESTOP, ESTOP_QUERY
+from hal.topics import ESTOP
 
 GO = Twist(0.5, 0.0)
 
@@ -32,8 +30,6 @@ def test_anybody_stops_it_and_it_moves_only_after_release_and_neutral():
         assert release_estop(anybody).state == "stopped"
         drive_until(client, GO, lambda applied: applied.reason is Reason.NEUTRAL_FIRST)
         get_going(client)
-        with pytest.raises(BusError, match="press or release"):
-            anybody.ask(ESTOP_QUERY, b"perhaps", 2.0)
 
 
 def test_the_latched_topic_presses_even_before_the_robot_is_there_and_false_releases_nothing():

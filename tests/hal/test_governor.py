@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 
 from hal.arming import TRANSITIONS, Event, State
 from hal.governor import GRACE_S, Governor, is_neutral
+from hal.lease import session_of
 from hal.messages import STOP, Command, Reason, Source, Twist
 from hal.profile import STOP_BUDGET_S, load_profile
 
@@ -362,7 +363,7 @@ def test_a_second_commander_is_refused_and_counted():
     desk.at(0.0, by(1, STOP, 0.0))
     assert desk.at(0.1, by(2, TURN, 0.1)).twist == STOP
     applied = desk.at(0.12, by(1, GO, 0.12))
-    assert (applied.twist, applied.epoch, applied.seq) == (GO, 1, 3)
+    assert (applied.twist, applied.session, applied.seq) == (GO, session_of(1), 3)
     assert desk.at(0.15, by(2, TURN, 0.15)).twist == GO
     assert desk.governor.refused == {"another commander": 2}
 
@@ -488,7 +489,7 @@ def test_no_sequence_of_events_breaks_a_promise(actions):
             governor.submit(replace(wish, stamp_s=stamp_s), now_s)
             if wish.source in newest_s and math.isfinite(stamp_s):
                 newest_s[wish.source] = max(newest_s[wish.source], min(stamp_s, now_s))
-                commanded_s[wish.source, wish.epoch] = now_s
+                commanded_s[wish.source, session_of(wish.epoch)] = now_s
             neutral_since_stop |= is_neutral(wish.twist) or wish.released
         applied = governor.tick(now_s)
         moving = not is_neutral(applied.twist)
@@ -506,4 +507,4 @@ def test_no_sequence_of_events_breaks_a_promise(actions):
             assert 0.0 <= applied.command_age_s < timeout_s
             assert newest_s[applied.source] > now_s - timeout_s
             # Whose command it is, commanded lately.
-            assert commanded_s[applied.source, applied.epoch] > now_s - timeout_s
+            assert commanded_s[applied.source, applied.session] > now_s - timeout_s

@@ -1,5 +1,6 @@
 """One robot of a name on a machine."""
 
+import stat
 import subprocess
 import sys
 import tempfile
@@ -33,6 +34,20 @@ def test_a_name_is_held_once_and_let_go_even_by_a_killed_process():
         holder.wait()
         holder.stdout.close()
     with only_instance(name):
+        pass
+
+
+def test_what_stands_for_a_name_is_the_user_s_own_and_goes_with_it(monkeypatch, tmp_path):
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
+    name = new_name()
+    with only_instance(name):
+        (lock,) = tmp_path.rglob("*.lock")
+        assert stat.S_IMODE(lock.parent.stat().st_mode) == 0o700
+        with pytest.raises(BusError, match="already runs"), only_instance(name):
+            pass
+    assert list(tmp_path.rglob("*.lock")) == []
+    lock.parent.chmod(0o777)
+    with pytest.raises(BusError, match="others may write"), only_instance(name):
         pass
 
 

@@ -13,9 +13,9 @@ from wiring import new_endpoint, new_name, wait_for
 from hal.bus import Bus
 from hal.connection import Connection
 from hal.errors import BusError
-from hal.messages import STOP, Applied, BatteryState, Twist
+from hal.messages import STOP, Applied, Bool, Twist
 from hal.session import open_session
-from hal.topics import APPLIED, BATTERY, CMD_VEL
+from hal.topics import APPLIED, CMD_VEL, ESTOP, INFO
 from tools import relay
 
 AWAY_S = 0.5  # less than a lease: the robot still holds the link that broke
@@ -50,7 +50,7 @@ def test_whatever_breaks_the_link_both_ends_hear_each_other_afterwards(watch):
     name, front, behind = new_name(), new_endpoint(), new_endpoint()
     robot = Bus(name, listen=behind)
     applied, commands = robot.publisher(APPLIED), robot.reader(CMD_VEL)
-    asked = robot.questions("alive")
+    asked = robot.questions(INFO)
     with relayed(front, behind):
         client = Bus(name, connect=front, watch=watch)
         results, command = client.reader(APPLIED), client.publisher(CMD_VEL)
@@ -73,7 +73,7 @@ def test_whatever_breaks_the_link_both_ends_hear_each_other_afterwards(watch):
 def is_answered(client, asked):
     """Whether the robot gets a question of the client's, and the client the answer."""
     answers = []
-    asking = threading.Thread(target=lambda: answers.append(client.ask("alive")))
+    asking = threading.Thread(target=lambda: answers.append(client.ask(INFO)))
     asking.start()
     wait_for(lambda: asked.serve(lambda question: question.answer(b"yes")) or not asking.is_alive())
     asking.join()
@@ -102,14 +102,14 @@ def test_what_is_latched_stays_so_on_the_next_link():
     robot = Bus(name, listen=behind)
     with relayed(front, behind):
         client = Bus(name, connect=front)
-        battery = client.publisher(BATTERY)  # kept: what nobody holds any more is not declared again
-        battery.put(BatteryState(1.0, 11.5), time_s=1.0)
+        button = client.publisher(ESTOP)  # kept: what nobody holds any more is not declared again
+        button.put(Bool(True), time_s=1.0)
         wait_for(lambda: robot.peers() == 1)
     with relayed(front, behind):
         wait_for(lambda: client.links() == 2)
-        late = robot.reader(BATTERY)
+        late = robot.reader(ESTOP)
         wait_for(lambda: late.newest() is not None)
-        assert late.newest().message.voltage_v == 11.5
+        assert late.newest().message == Bool(True)
     assert client.close()
     assert robot.close()
 

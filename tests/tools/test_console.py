@@ -154,6 +154,14 @@ def test_who_drives_is_said(view, words):
     assert driver_words(view)[0] == words
 
 
+def test_who_commands_is_named_and_a_confirmed_stop_says_so():
+    named = replace(VIEW, applied=replace(APPLIED_NOW, source=Source.TELEOP, commander="laptop-2"))
+    assert driver_words(named) == ("HUMAN", "laptop-2 drives: the dead-man is held")
+    assert driver_words(replace(VIEW, applied=replace(APPLIED_NOW, commander="anna")))[1].startswith("anna drives: ")
+    assert not driver_words(replace(VIEW, estop=True))[1].startswith("confirmed")
+    assert driver_words(replace(VIEW, estop=True, confirmed=True))[1].startswith("confirmed by the robot; ")
+
+
 PAUSED = replace(VIEW, answer=OperatorAnswer(1.0, paused=True, count=2, words="paused"), answer_age_s=0.1)
 
 
@@ -231,7 +239,7 @@ def drive_for(reader, duration_s=2.0):
     reader.poll()
     time.sleep(duration_s)
     results = [received.message for received in reader.poll()]
-    first = {(r.epoch, r.seq): r.stamp_s - r.command_age_s for r in reversed(results)}
+    first = {(r.session, r.seq): r.stamp_s - r.command_age_s for r in reversed(results)}
     return results, np.diff(sorted(first.values()))
 
 

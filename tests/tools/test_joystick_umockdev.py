@@ -5,7 +5,7 @@ import json
 import os
 import signal
 import statistics
-import sys
+import threading
 import time
 
 import pytest
@@ -13,9 +13,12 @@ from pad_bed import SONY, Bed, library
 
 from hal.bus import Bus
 from hal.estop import look_at_estop
+from hal.governed import GovernedRobot
 from hal.messages import STOP, OperatorRequest, Reason, Request, Source
+from hal.null import NullRobot
+from hal.profile import load_profile
+from hal.server import HalServer
 from hal.topics import APPLIED, JOY, OPERATOR, TELEOP
-from tools.bench import null_robot
 from tools.processes import ChildProcess, free_port, lira_command
 
 if library() is None:
@@ -34,12 +37,23 @@ def wait_for(condition, why=lambda: "never happened", timeout_s=20.0):
 
 
 @pytest.fixture(scope="module")
-def address(tmp_path_factory):
-    name, endpoint = f"pad{os.getpid()}", f"127.0.0.1:{free_port()}"
-    command = [sys.executable, "-P", "-m", "tools.bench.null_robot", name, endpoint]
-    with ChildProcess("the robot", command, tmp_path_factory.mktemp("robot") / "log") as robot:
-        robot.wait_ready(null_robot.READY, 30.0)
-        yield name, endpoint
+def robot():
+    """The robot's own bus: what it is commanded, nobody else hears."""
+    bus = Bus(f"pad{os.getpid()}", listen=f"127.0.0.1:{free_port()}")
+    stop, ready = threading.Event(), threading.Event()
+    inner = NullRobot(load_profile("thesis-sim"), time.monotonic, time.sleep)
+    server = threading.Thread(target=HalServer(GovernedRobot(inner), bus, ready=ready.set).run, args=[stop])
+    server.start()
+    assert ready.wait(10.0)
+    yield bus
+    stop.set()
+    server.join(10.0)
+    assert bus.close()
+
+
+@pytest.fixture(scope="module")
+def address(robot):
+    return robot.robot, robot.endpoint
 
 
 @pytest.fixture(scope="module")
@@ -72,9 +86,9 @@ class Watcher:
 
 
 class Rig:
-    def __init__(self, bed, bus, process):
+    def __init__(self, bed, bus, robot, process):
         self.bed, self.process = bed, process
-        self.applied, self.teleop, self.joy = Watcher(bus, APPLIED), Watcher(bus, TELEOP), Watcher(bus, JOY)
+        self.applied, self.teleop, self.joy = Watcher(bus, APPLIED), Watcher(robot, TELEOP), Watcher(bus, JOY)
         self.asked = Watcher(bus, OPERATOR)
 
     def says(self, words, times=1):
@@ -124,14 +138,14 @@ class Rig:
 
 
 @pytest.fixture
-def start(bed, bus, address, tmp_path):
+def start(bed, bus, robot, address, tmp_path):
     running = []
 
     def start(*words, prefix=()):
         command = lira_command("joystick", "--name", address[0], "--connect", address[1], *words)
         process = ChildProcess("the bridge", [*prefix, *bed.environment, *command], tmp_path / f"{next(NUMBERS)}.log")
         running.append(process)
-        return Rig(bed, bus, process)
+        return Rig(bed, bus, robot, process)
 
     yield start
     for process in running:
@@ -218,7 +232,7 @@ def test_a_frozen_pad_stands_and_drives_again_when_it_is_back(rig):
 def test_the_emergency_stop_and_its_release(rig, bus):
     rig.begin()
     rig.bed.key(PAD, "BTN_MODE", 1)
-    rig.says("emergency stop: the robot stands")
+    rig.says("emergency stop: the robot stands (confirmed by the robot)")
     assert look_at_estop(bus).pressed
     rig.bed.key(PAD, "BTN_MODE", 0)
     rig.let_go()

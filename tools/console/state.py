@@ -24,7 +24,8 @@ class View:
     """What is known now. A part is None until it was heard; ages are in seconds since it was.
 
     `camera` is RGB, uint8 [height, width, 3]. `hand` is the keyboard's, None without one. `answer` is whoever's who
-    drives and learns; `unanswered` is the keyboard's request that nobody answered.
+    drives and learns; `unanswered` is the keyboard's request that nobody answered. `confirmed`: the robot has answered
+    that the emergency stop holds which was pressed here.
     """
 
     robot: str
@@ -42,6 +43,7 @@ class View:
     answer_age_s: float = float("inf")
     unanswered: Request | None = None
     estop: bool = False
+    confirmed: bool = False
     hand: State | None = None
     fov_rad: float = 2.269
     max_range_m: float = 4.0
@@ -71,16 +73,24 @@ class View:
 def driver_words(view: View) -> tuple[str, str]:
     """Who drives, and why, each in a few words."""
     if view.estop:
-        return "EMERGENCY STOP", "release: START held on the pad, or F1 here"
+        release = "release: START held on the pad, or F1 here"
+        return "EMERGENCY STOP", f"confirmed by the robot; {release}" if view.confirmed else release
     if view.applied is None or view.link_age_s > STALE_S:
         return "NO LINK", "the robot has not been heard; it stops by itself"
     if view.applied.source == "teleop":
-        return "HUMAN", "the dead-man is held" + ("; paused: nothing is learned" if view.paused else "")
+        why = "the dead-man is held" + ("; paused: nothing is learned" if view.paused else "")
+        return "HUMAN", _named(view.applied, why)
     if view.paused:
         return "PAUSED", "it stands and learns nothing; P, or square on the pad, goes on"
     if view.applied.source == "none":
         return "STANDS", REASONS.get(view.applied.reason, view.applied.reason)
-    return policy_words(view.deciding)
+    who, why = policy_words(view.deciding)
+    return who, _named(view.applied, why)
+
+
+def _named(applied: Applied, why: str) -> str:
+    """Why, with the name of who commands where keys tell it."""
+    return f"{applied.commander} drives: {why}" if applied.commander else why
 
 
 REASONS = {

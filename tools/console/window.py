@@ -42,7 +42,8 @@ KEYS = {
 class Keyboard:
     """The keyboard's hand on the wheel, and what it asks; a window without the focus is a pad that is lost.
 
-    `unanswered` is the newest request if nobody answered it.
+    `unanswered` is the newest request if nobody answered it; `confirmed` whether the robot says that the emergency stop
+    holds which was pressed here.
     """
 
     def __init__(self, wheel: Wheel) -> None:
@@ -55,6 +56,11 @@ class Keyboard:
     def state(self) -> State:
         """Where the hand is."""
         return self._hand.state
+
+    @property
+    def confirmed(self) -> bool:
+        """Whether the robot has acknowledged the emergency stop."""
+        return self._wheel.confirmed
 
     def update(self, pressed: frozenset[str] | None) -> None:
         """Send what the keys order; None without the focus."""
@@ -115,7 +121,7 @@ def show(look: Callable[[], View], keyboard: Keyboard | None, stop: threading.Ev
                 keyboard.update(pressed if focused else None)
             view = look()
             if keyboard is not None:
-                view = replace(view, hand=keyboard.state, unanswered=keyboard.unanswered)
+                view = replace(view, hand=keyboard.state, unanswered=keyboard.unanswered, confirmed=keyboard.confirmed)
             if view.call != call and view.call in sounds:
                 sounds[view.call].play()
             call = view.call

@@ -63,6 +63,7 @@ class Wheel:
         self._answers = watch.reader(OPERATOR_ANSWER, DEPTH)
         self._answered = 0
         self._asked: tuple[Request, float] | None = None  # and when, until it is answered
+        self.confirmed = False  # that the emergency stop holds which was pressed here: by the robot itself
         self.paused = False
         self.experts: tuple[str, ...] = ()
         self._clock = ClockEstimate()
@@ -130,14 +131,21 @@ class Wheel:
         return request
 
     def estop(self, pressed: bool) -> None:
-        """Press or release the emergency stop: at once on the topic, and by a query that waits aside for its answer."""
+        """Press or release the emergency stop: at once on the topic, and by a query that waits aside for its answer.
+
+        Only the robot that is heard can answer: what comes from another session confirms nothing.
+        """
+        self.confirmed = False
         self._estop.put(Bool(pressed), 0.0)
         threading.Thread(target=self._ask, args=(pressed,), name="estop", daemon=True).start()
 
     def _ask(self, pressed: bool) -> None:
+        ask = press_estop if pressed else release_estop
         try:
-            state = press_estop(self._bus) if pressed else release_estop(self._bus)
+            state = ask(self._bus, epoch=self._clock.epoch)
         except BusError as error:
             self._say(f"EMERGENCY STOP NOT ACKNOWLEDGED: {error}" if pressed else f"not released: {error}")
         else:
-            self._say("emergency stop: the robot stands" if state.pressed else "emergency stop released")
+            self.confirmed = state.pressed
+            words = "emergency stop: the robot stands" if state.pressed else "emergency stop released"
+            self._say(f"{words} (confirmed by the robot)")

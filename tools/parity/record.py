@@ -8,6 +8,7 @@ from hal.bus import Bus, Reader
 from hal.clock import ClockEstimate
 from hal.desk import LOCKSTEP, info_from_json
 from hal.errors import BusError, ConfigError
+from hal.lease import session_of
 from hal.messages import STOP, Applied, CompressedImage, Imu, LaserScan, Odometry, Reason, Source
 from hal.profile import RobotProfile
 from hal.senses import Stamped
@@ -85,7 +86,7 @@ def record(bus: Bus, name: str) -> Recording:
 class _Driver:
     def __init__(self, bus: Bus, recording: Recording) -> None:
         self.recording = recording
-        self._epoch = bus.epoch
+        self._session = session_of(bus.epoch)
         self._commands = bus.publisher(CMD_VEL)
         self._clock = ClockEstimate()
         self._readers: list[tuple[Reader[Any], list[Any]]] = [
@@ -133,7 +134,7 @@ class _Driver:
         if not self.recording.applied:
             return False
         newest = self.recording.applied[-1].message
-        return newest.reason is Reason.OK and (newest.source, newest.epoch) == (Source.POLICY, self._epoch)
+        return newest.reason is Reason.OK and (newest.source, newest.session) == (Source.POLICY, self._session)
 
     def _check(self, phase: Phase) -> None:
         """Raise if the robot did something else in the end."""

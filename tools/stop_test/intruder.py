@@ -48,7 +48,7 @@ class Intruder:
     def replay(self) -> None:
         """Say again in the commander's name what it might have said a while ago."""
         heard = self._hear()
-        old = Attachment(heard.epoch, max(heard.seq - 1, 0), round((heard.stamp_s - OLD_S) * 1e9)).to_bytes()
+        old = Attachment(heard.session, max(heard.seq - 1, 0), round((heard.stamp_s - OLD_S) * 1e9)).to_bytes()
         self._repeat(lambda: self._bus.put_raw(CMD_VEL, encode(BACK), old))
 
     def take_lease(self) -> None:

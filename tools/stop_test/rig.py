@@ -52,10 +52,11 @@ class Rig:
         self._running: dict[str, ChildProcess] = {}
         self._tested, self._runs = POLICY, 0
         if self._keys is not None:
+            from hal.keys import Role
             from tools.authority import enroll, init
 
             init(self._keys)
-            enroll(self._keys, "guest", drives=False)
+            enroll(self._keys, "guest", Role.VIEWER)
         if stand.drivers:
             words = [self._profile_name, str(self.journal), str(self._ears[WORLD]), str(folder)]
             self._run_module(WORLD, world.__name__, words)
