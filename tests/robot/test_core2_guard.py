@@ -126,13 +126,13 @@ def test_who_was_thawed_counts_a_loss_and_stands_for_a_moment(board, tmp_path, m
         board.wait_for(GO)
         losses, guard = base.losses, base._guard
         told, guard.tell = guard.tell, lambda: False  # alive, but it says nothing
-        stood_s = board.wait_for(STOP, 1.0)
+        stood_s = board.wait_for(STOP, 3.0)
         guard.tell = told
-        until_s = time.monotonic() + 1.0
+        until_s = time.monotonic() + 3.0
         while base.losses == losses:
             assert time.monotonic() < until_s
             time.sleep(0.005)
-        assert board.wait_for(GO, 2.0) - stood_s > 0.05
+        assert board.wait_for(GO, 4.0) - stood_s > 0.05
     finally:
         keeper.close()
 
