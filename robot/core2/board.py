@@ -67,7 +67,7 @@ class Board:
     @property
     def ready(self) -> bool:
         """Whether it can be driven and configured."""
-        return not self.missing and self._config is not None and not self._refused
+        return not (self.missing or self._refused or self._config is None or self._config_answers is None)
 
     @property
     def has_announced(self) -> bool:

@@ -104,6 +104,7 @@ class Core2:
 
     def session(self, stop: threading.Event, begin: Callable[[], None]) -> None:
         """Open, drive until `stop` is set or the board is lost, and leave it still. Raises `DeviceError`."""
+        self._board.forget()  # whatever is at this line now has announced nothing
         line = Line(self._url, BAUDS[0])
         try:
             if stop.wait(self._settings.boot_s):
@@ -143,7 +144,6 @@ class Core2:
         it has announced itself, and stands until there is a command of later than that.
         """
         board = self._board
-        board.forget()
         self._sent_s = -math.inf
         due_s = asked_s = learning_s = looped_s = time.monotonic()
         contact, begun = Contact(due_s), False

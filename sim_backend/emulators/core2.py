@@ -106,7 +106,7 @@ class Core2Unit:
         self.kinematics = "DIFF"
         self.target = STOP
         self.obeyed_unannounced = 0  # commands that came when it ran again and had announced nothing
-        self._commanded_s = -math.inf
+        self.commanded_s = -math.inf
         self._driven, self._drive_again_s = STOP, -math.inf
         self._clock_s: float | None = None  # the host's time less ours
         self._asked_s = self._answered_s = -math.inf
@@ -132,7 +132,7 @@ class Core2Unit:
         if self._booting(now_s):
             garbage = BOOT_TEXT[self._random.randrange(len(BOOT_TEXT)) :]
             return garbage if self._random.random() < 0.02 else b""
-        if self.watchdog and now_s - self._commanded_s > WATCHDOG_S and self.target != STOP:
+        if self.watchdog and now_s - self.commanded_s > WATCHDOG_S and self.target != STOP:
             self.target = STOP
         target = self.target if self.motors else STOP
         if target != self._driven or now_s >= self._drive_again_s:
@@ -176,7 +176,7 @@ class Core2Unit:
             self.configured = False
         elif topic == self.subscribed["cmd_vel"]:
             linear, angular = struct.unpack_from("<d", payload)[0], struct.unpack_from("<d", payload, 40)[0]
-            self.target, self._commanded_s = Twist(linear, angular), now_s
+            self.target, self.commanded_s = Twist(linear, angular), now_s
         elif topic == self.config_request_id:
             word, rest = unpack_string(payload)
             result, answer = self._configure(word, unpack_string(rest)[0])

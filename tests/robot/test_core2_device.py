@@ -183,6 +183,20 @@ def test_no_farewell_goes_to_a_board_that_has_announced_nothing_since_it_was_los
         assert bench.twists[-1] == STOP
 
 
+def test_what_is_at_the_line_when_it_is_opened_again_gets_requests_only(tmp_path, monkeypatch):
+    monkeypatch.setattr("robot.core2.device.FRAME_S", 0.1)
+    monkeypatch.setattr("robot.core2.device.BAUDS", (525000,))
+    with Bench(tmp_path / "base") as bench:
+        bench.keep(Twist(0.2, 0.0), 0.2)
+        bench.wire.unplug()
+        bench.unit.reset(0.0)
+        bench.wire.mute = True
+        bench.wire.plug()
+        wait_for(lambda: "no base board answers" in str(bench.keeper.failure), 8.0)
+        time.sleep(0.1)
+        assert bench.unit.commanded_s == -math.inf
+
+
 def test_garbage_is_counted_and_survived(tmp_path):
     with Bench(tmp_path / "base") as bench:
         bench.wire.disturb(400)
