@@ -46,7 +46,7 @@ class Checkpoint:
 
 def save_checkpoint(path: Path, network: Network, checkpoint: Checkpoint) -> None:
     """Write a checkpoint whole or not at all. Raises `StorageError`."""
-    write_whole(path, save(network.weights(), {_KEY: json.dumps(asdict(checkpoint))}))
+    write_whole(path, save(network.weights(), {_KEY: json.dumps(asdict(checkpoint))}), folder=True)
 
 
 def load_checkpoint(path: Path) -> tuple[Network, Checkpoint]:

@@ -85,15 +85,16 @@ def load_json(path: Path, kind: type[T], most: int = MOST_BYTES) -> T:
         raise ConfigError(f"{path}: {error}", COMPARE) from error
 
 
-def write_whole(path: Path, data: bytes) -> None:
+def write_whole(path: Path, data: bytes, *, folder: bool = False) -> None:
     """Put a file in its place whole, and on the disk itself, or leave what is there. Raises `StorageError`.
 
-    A link stays one, and a device or a pipe is written to as it is.
+    A link stays one, and a device or a pipe is written to as it is. `folder`: make it where there is none.
     """
     whole = Path(os.path.realpath(path))
     draft = whole.with_name(f"{whole.name}.{os.getpid()}.tmp")
     try:
-        whole.parent.mkdir(parents=True, exist_ok=True)
+        if folder:
+            whole.parent.mkdir(parents=True, exist_ok=True)
         if whole.exists() and not whole.is_file():
             whole.write_bytes(data)
             return

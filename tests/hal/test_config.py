@@ -88,7 +88,9 @@ def test_a_file_at_the_bound_is_read(tmp_path):
 
 def test_a_file_is_written_whole_or_not_at_all(tmp_path, monkeypatch):
     path, link = tmp_path / "new" / "file", tmp_path / "link"
-    write_whole(path, b"first")
+    with pytest.raises(StorageError, match="No such file"):
+        write_whole(path, b"first")  # a slip of the pen makes no folder
+    write_whole(path, b"first", folder=True)
     link.symlink_to(path)
     write_whole(link, b"second")
     assert link.is_symlink()

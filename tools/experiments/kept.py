@@ -29,4 +29,4 @@ def kept(trial: Trial, folder: Path) -> Outcome | None:
 
 def keep(outcome: Outcome, folder: Path) -> None:
     """Write an outcome whole or not at all. Raises `StorageError`."""
-    write_whole(folder / outcome.trial.file, msgspec.json.encode(outcome))
+    write_whole(folder / outcome.trial.file, msgspec.json.encode(outcome), folder=True)

@@ -56,7 +56,7 @@ def to_json(summary: Summary) -> str:
 
 def write_summary(path: Path, summary: Summary) -> None:
     """Write it, and the folder where there is none yet. Raises `StorageError`."""
-    write_whole(path, (to_json(summary) + "\n").encode())
+    write_whole(path, (to_json(summary) + "\n").encode(), folder=True)
 
 
 def read_summary(path: Path) -> Summary:

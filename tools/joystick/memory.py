@@ -51,7 +51,7 @@ class PadMemory:
         self._pads[pad] = traits
         if self._path is not None:
             try:
-                write_whole(self._path, msgspec.json.format(msgspec.json.encode(self._pads)))
+                write_whole(self._path, msgspec.json.format(msgspec.json.encode(self._pads)), folder=True)
             except StorageError as error:
                 self._give_up(error.what)
 
