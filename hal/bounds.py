@@ -15,7 +15,7 @@ LONGEST_TEXT = 4096
 MOST_ITEMS = 1024
 MOST_BEAMS = 16_384
 INTEGERS = range(-(2**63), 2**63)
-TOKENS = range(2**64)  # a session's epoch
+TOKENS = range(2**64)  # a session's epoch, and its digest
 FULL_TURNS_RAD = 2 * math.tau
 _ALL_FINITE = (Odometry, Imu)  # what draws or adds them up has no use for a part of one
 _ENDLESS = ("range_m", "clearance_m")  # there may be nothing there
@@ -34,7 +34,7 @@ def _check(value: Any, name: str) -> None:
     if isinstance(value, float):
         _need(not abs(value) > LARGEST or (name in _ENDLESS and math.isinf(value)), name, value)
     elif isinstance(value, int):
-        _need(value in (TOKENS if name == "epoch" else INTEGERS), name, value)
+        _need(value in (TOKENS if name in ("epoch", "session") else INTEGERS), name, value)
     elif isinstance(value, str):
         _need(len(value) <= LONGEST_TEXT, name, f"{len(value)} characters")
     elif isinstance(value, tuple):

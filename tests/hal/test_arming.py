@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 
 from hal.governed import GovernedRobot
 from hal.governor import is_neutral
+from hal.lease import session_of
 from hal.messages import STOP, Applied, Command, Reason, Source, Twist
 from hal.null import NullRobot
 from hal.port import DeviceHealth
@@ -254,7 +255,8 @@ class Bystander:
         (self.on.discard if released else self.on.add)(who)
 
     def allows(self, applied: Applied):
-        return (applied.source, applied.epoch) in self.may or applied.source in self.may
+        sessions = {(source, session_of(epoch)) for source, epoch in self.may - {P, T}}
+        return (applied.source, applied.session) in sessions or applied.source in self.may
 
 
 PEERS = {"policy": (P, 1), "other policy": (P, 7), "bare policy": (P, 0), "hand": (T, 2), "bare hand": (T, 3)}

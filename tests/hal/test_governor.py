@@ -262,7 +262,7 @@ def test_a_zero_of_a_hand_that_has_let_go_takes_nobodys_lease():
     back_s = silent_s + 0.1
     assert desk.at(back_s, by(1, STOP, back_s, source=T)).reason is Reason.OK
     desk.at(back_s + 0.02, by(1, STOP, back_s + 0.02, source=T, released=True))
-    assert desk.at(back_s + 0.04, by(3, GO, back_s + 0.04, source=T)).epoch == 3
+    assert desk.at(back_s + 0.04, by(3, GO, back_s + 0.04, source=T)).session == session_of(3)
     assert desk.governor.refused == {}
 
 
