@@ -1,0 +1,317 @@
+"""The processes under test in one setup: a robot, its commanders, the link between them, and somebody to watch."""
+
+import contextlib
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager
+from datetime import UTC, datetime
+from pathlib import Path
+
+import msgspec
+
+from hal.bus import Bus
+from hal.errors import BusError
+from hal.estop import release_estop
+from hal.keys import VARIABLE as KEYS_VARIABLE
+from hal.keys import load_keys
+from hal.messages import Episode, Source
+from hal.profile import RobotProfile, load_profile
+from hal.topics import APPLIED, DIAGNOSTICS, INFO, RESET
+from tools import relay
+from tools.processes import ChildProcess, free_port, lira_command
+from tools.stop_test import driver, hand, launch, robot, world
+from tools.stop_test.acts import StopTestError
+from tools.stop_test.control import ASK_TIME, TIME, tell
+from tools.stop_test.intruder import Intruder
+from tools.stop_test.journal import Journal, read_journal
+from tools.stop_test.mutants import Mutant
+from tools.stop_test.setups import Setup, clock_library
+
+READY_S = 60.0
+AGAIN_S = 5.0
+MOVING_S = 25.0  # a link that was dark comes back within seconds
+SETTLE_S = 0.3
+FAST = 0.95  # share of its top speed at which a driver by word has got going; a policy looks where it goes
+CAREFUL = 0.3
+CLOCK_S = 6.0
+NEAR_S = 60.0
+ANSWER_S = 5.0
+RELEASE_S = 1.0
+BRIEF_S = 12.0
+POLL_S = 0.02
+POLICY, HAND, ROBOT, WORLD, LINK = "policy", "hand", "robot", "world", "link"
+LAPTOP, GUEST, DRIVING = "laptop", "guest", ("brief", "leaver")
+READY = {POLICY: driver.READY, HAND: hand.READY, ROBOT: robot.READY, WORLD: world.READY}
+NOTED = {POLICY: "driver", HAND: "hand"}
+
+
+class ProcessBench:
+    """Implements `acts.Bench`. With a `mutant` the process that it belongs to is broken by it."""
+
+    def __init__(self, stack: ExitStack, folder: Path, profile: str, setup: Setup, mutant: Mutant | None) -> None:
+        self._stack, self._folder, self._setup, self._mutant = stack, folder, setup, mutant
+        self._profile_name = setup.profile or profile
+        self.profile: RobotProfile = load_profile(self._profile_name)
+        self.name, self._port, self._front = f"stop_{free_port()}", free_port(), free_port()
+        self.journal = folder / "journal.bin"
+        self._ports = {role: free_port() for role in READY}
+        self._running: dict[str, ChildProcess] = {}
+        self._tested, self._runs, self._certificate = POLICY, 0, LAPTOP
+        self._expires = datetime.now(UTC)
+        self._noted_before = 0  # bytes of the journal, by earlier trials
+        self._keys = self._make_keys() if setup.keys else None
+        if setup.drivers:
+            words = [self._profile_name, str(self.journal), str(self._ports[WORLD]), str(folder)]
+            self._run_module(WORLD, world.__name__, words)
+        self.restart_robot()
+        behind = self._port
+        if setup.link:
+            behind = free_port()
+            self._link_words = [str(behind), str(self._port)]
+            self.restart_link()
+        self.relay = stack.enter_context(relay.Relay(self._front, behind))
+        keys = None if self._keys is None else load_keys(self._keys / LAPTOP)
+        self.observer = Bus(self.name, connect=f"127.0.0.1:{self._port}", keys=keys)
+        stack.callback(self.observer.close)
+        self.observer.ask(INFO)
+        self._applied, self._reports = self.observer.reader(APPLIED), self.observer.reader(DIAGNOSTICS)
+        self.intruder = Intruder(self.observer, self.journal, self._keys)
+        stack.callback(self.intruder.rest)
+
+    @property
+    def driver(self) -> ChildProcess:
+        """The commander under test."""
+        return self._running[self._tested]
+
+    @property
+    def robot(self) -> ChildProcess:
+        """The robot's process."""
+        return self._running[ROBOT]
+
+    @property
+    def link(self) -> ChildProcess:
+        """The process in the link."""
+        return self._running[LINK]
+
+    @property
+    def run_folder(self) -> Path:
+        """Where a commander that learns writes."""
+        return self._folder / f"run-{self._runs}"
+
+    def tell_driver(self, message: str) -> None:
+        """Send a control message to the commander under test."""
+        tell(self._ports[self._tested], message)
+
+    def tell_robot(self, message: str) -> None:
+        """Send one to the robot's process."""
+        tell(self._ports[ROBOT], message)
+
+    def tell_world(self, message: str) -> None:
+        """Send one to the robot's devices."""
+        tell(self._ports[WORLD], message)
+
+    def restart_robot(self) -> None:
+        """Start the robot's process."""
+        words = [self.name, f"127.0.0.1:{self._port}", self._profile_name, str(self.journal), str(self._ports[ROBOT])]
+        if self._setup.drivers:
+            words += [str(self._folder), self._running[WORLD].output().partition(world.READY)[2].split()[0]]
+        self._run_module(ROBOT, robot.__name__, words)
+
+    def restart_link(self) -> None:
+        """Start the process in the link."""
+        self._run(LINK, [sys.executable, "-P", "-m", relay.__name__, *self._link_words], relay.READY)
+
+    def set_clock(self, who: str, offset_s: int) -> None:
+        """Set a process's time of day. Raises `StopTestError` if it takes no notice."""
+        role = self._write_clock(who, offset_s)
+        deadline_s = time.monotonic() + CLOCK_S
+        while True:
+            tell(self._ports[role], ASK_TIME)
+            time.sleep(POLL_S * 5)
+            told = self._running[role].output().rpartition(TIME)[2].split()
+            if told and abs(float(told[0]) - time.time() - offset_s) < NEAR_S:
+                return
+            if time.monotonic() > deadline_s:
+                raise StopTestError(f"the {who}'s clock cannot be set", "Is libfaketime whole?")
+
+    def reset_clock(self, who: str) -> None:
+        """Set a process's time of day to the true one, within a second of its running."""
+        self._write_clock(who, 0)
+
+    def wait_expired(self) -> None:
+        """Wait until the commander's certificate runs out."""
+        time.sleep(max((self._expires - datetime.now(UTC)).total_seconds(), 0.0))
+
+    def revoke(self, name: str) -> None:
+        """Shut a name out. Raises `StopTestError` if the verb does not."""
+        command = lira_command("keys", "revoke", name, str(self._keys))
+        done = subprocess.run(command, capture_output=True, text=True, timeout=ANSWER_S * 4, check=False)
+        if done.returncode != 0:
+            raise StopTestError(f"lira keys revoke ended with status {done.returncode}", f"It wrote: {done.stderr}")
+
+    def drive(self, *, by_hand: bool, certificate: str) -> None:
+        """Put the robot back to its start and get it going. Raises `StopTestError` if it does not."""
+        self._tested = HAND if by_hand else POLICY
+        self._noted_before = self.journal.stat().st_size
+        if self._setup.drivers:
+            tell(self._ports[WORLD], "reset")
+            time.sleep(SETTLE_S)
+        else:
+            self.observer.ask(RESET, msgspec.json.encode(Episode()))
+        self._show(certificate)
+        for role in (POLICY, HAND) if by_hand else (POLICY,):
+            self._start_commander(role)
+            self._wait_until_it_drives(role)
+        time.sleep(SETTLE_S)
+
+    def is_fast(self, since_s: float = 0.0) -> bool:
+        """Whether the robot drives as it does when nothing is wrong, and has been told so since a time."""
+        wheels = [one for one in self.noted().wheels if one.time_s >= since_s]
+        share = CAREFUL if self._setup.fusion else FAST
+        return bool(wheels) and wheels[-1].linear_m_s > share * self.profile.base.max_linear_m_s
+
+    def ask_for_motion(self) -> None:
+        """Have the commander, or another if it is dead, ask for motion, and never for zero."""
+        if self._running[POLICY].status() is not None:
+            self._run_driver()
+        self._running[self._tested].signal(signal.SIGCONT)
+        tell(self._ports[POLICY], "insist")
+
+    def noted(self) -> Journal:
+        """What was noted since the robot was put back to its start."""
+        return read_journal(self.journal, start=self._noted_before)
+
+    def refused(self, reasons: tuple[str, ...]) -> int:
+        """How much was refused so far for one of these reasons, by the robot's next report. Raises `StopTestError`."""
+        self._reports.poll()
+        deadline_s = time.monotonic() + ANSWER_S
+        while not (reports := self._reports.poll()):
+            if time.monotonic() > deadline_s:
+                raise StopTestError("the robot says nothing on diagnostics", "Look whether it still runs.")
+            time.sleep(POLL_S)
+        counts = dict(pair for status in reports[-1].message.status for pair in status.values)
+        names = (name for reason in reasons for name in (f"refused: {reason}", f"refused {reason}"))
+        return sum(int(counts.get(name, 0)) for name in names)
+
+    def renew(self, *, fatal: bool) -> None:
+        """After a trial: everybody leaves; a commander that is of no use ends."""
+        self.intruder.rest()
+        for role in (POLICY, HAND):
+            if role in self._running:
+                tell(self._ports[role], "leave")
+                self._running[role].signal(signal.SIGCONT)
+        with contextlib.suppress(BusError):
+            release_estop(self.observer, RELEASE_S)
+        if fatal:
+            with contextlib.suppress(TimeoutError):
+                self.intruder.leave()
+        if fatal or self._setup.fusion:
+            self._running.pop(POLICY).stop()
+        time.sleep(SETTLE_S)
+
+    def _make_keys(self) -> Path:
+        from tools.authority import enroll, init
+
+        folder = self._folder / "keys"
+        init(folder)
+        enroll(folder, GUEST, drives=False)
+        for name in DRIVING:
+            enroll(folder, name, drives=True)
+        return folder
+
+    def _show(self, certificate: str) -> None:
+        """Have the commander show this certificate from its next start on; one that is brief, for a while."""
+        if certificate != self._certificate and POLICY in self._running:
+            self._running.pop(POLICY).stop()
+        self._certificate = certificate
+        if self._keys is not None and certificate == "brief":
+            from tools.stop_test.certificates import shorten
+
+            self._expires = shorten(self._keys, certificate, BRIEF_S)
+
+    def _write_clock(self, who: str, offset_s: int) -> str:
+        role = ROBOT if who == "robot" else self._tested
+        self._clock_file(role).write_text(f"{offset_s:+d}", encoding="utf-8")
+        return role
+
+    def _start_commander(self, role: str) -> None:
+        if self._setup.fusion:
+            self._runs += 1
+            fusion = [word.format(run=self.run_folder) for word in self._setup.fusion]
+            words = ["fusion", *fusion, "--name", self.name, "--connect", f"127.0.0.1:{self._front}"]
+            self._run(POLICY, self._python(POLICY, "tools", words, "fusion"), self.name)
+            return
+        if role not in self._running or self._running[role].status() is not None:
+            if role == POLICY:
+                self._run_driver()
+            else:
+                words = [self.name, f"127.0.0.1:{self._front}", str(self._ports[HAND])]
+                self._run_module(HAND, hand.__name__, words)
+        tell(self._ports[role], "go")
+
+    def _run_driver(self) -> None:
+        words = [self.name, f"127.0.0.1:{self._front}", str(self._ports[POLICY]), str(self.journal)]
+        self._run_module(POLICY, driver.__name__, words)
+
+    def _wait_until_it_drives(self, role: str) -> None:
+        began_s = told_s = time.monotonic()
+        while not (self.is_fast(began_s) and self._source() is (Source.TELEOP if role == HAND else Source.POLICY)):
+            if not self._setup.fusion and time.monotonic() - told_s > AGAIN_S:
+                # A busy machine stopped the robot before it was fast, and it waits for a stick at rest.
+                tell(self._ports[role], "leave")
+                time.sleep(SETTLE_S)
+                tell(self._ports[role], "go")
+                told_s = time.monotonic()
+            if time.monotonic() - began_s > MOVING_S:
+                raise StopTestError(
+                    f"the robot did not get going; {role} wrote:\n{self._running[role].tail()}", "Look there."
+                )
+            time.sleep(POLL_S)
+
+    def _source(self) -> Source:
+        newest = self._applied.newest()
+        return Source.NONE if newest is None else newest.message.source
+
+    def _run_module(self, role: str, module: str, words: list[str]) -> None:
+        self._run(role, self._python(role, module, words, NOTED.get(role)), READY[role])
+
+    def _run(self, role: str, command: list[str], ready: str) -> None:
+        process = self._stack.enter_context(ChildProcess(role, command, self._folder / f"{role}.log"))
+        self._running[role] = process
+        process.wait_ready(ready, READY_S)
+
+    def _python(self, role: str, module: str, words: list[str], noted: str | None) -> list[str]:
+        """Command that starts a module, with what is peculiar to the setup, the mutant and the journal."""
+        options = [] if noted is None else ["--note", str(self.journal), noted]
+        if self._mutant is not None and self._mutant.where == role:
+            options += ["--mutant", self._mutant.name]
+        if self._setup.clocks:
+            options.append("--shifted")
+        return [*self._environment(role), sys.executable, "-P", "-m", launch.__name__, *options, module, *words]
+
+    def _environment(self, role: str) -> list[str]:
+        """Words that start a command with what is peculiar to the setup."""
+        settings = {}
+        if self._keys is not None:
+            settings[KEYS_VARIABLE] = str(self._keys / ("robot" if role == ROBOT else self._certificate))
+        if self._setup.clocks:
+            self._clock_file(role).write_text("+0", encoding="utf-8")
+            settings["LD_PRELOAD"] = str(clock_library())
+            settings["FAKETIME_TIMESTAMP_FILE"] = str(self._clock_file(role))
+            settings["FAKETIME_CACHE_DURATION"] = "1"
+            settings["FAKETIME_DONT_FAKE_MONOTONIC"] = "1"
+        return ["env", *(f"{name}={value}" for name, value in settings.items())] if settings else []
+
+    def _clock_file(self, role: str) -> Path:
+        return self._folder / f"{role}.clock"
+
+
+@contextmanager
+def open_bench(folder: Path, profile: str, setup: Setup, mutant: Mutant | None = None) -> Iterator[ProcessBench]:
+    """Start everything of a setup, and stop it in the end."""
+    with ExitStack() as stack:
+        folder.mkdir(parents=True, exist_ok=True)
+        yield ProcessBench(stack, folder, profile, setup, mutant)

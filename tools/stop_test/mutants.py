@@ -1,0 +1,216 @@
+"""The product, broken in known ways: each a small patch inside a process under test, with the rows that it has to fail.
+
+`lira stop-test --mutants` tries them. A patch that no longer finds what it replaces is an error: it proves nothing.
+"""
+
+import math
+import os
+import signal
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import Any
+
+from hal.errors import LiraError
+
+FOREVER_S = 1e9
+PATIENT_S = 2.0
+
+
+class MutantError(LiraError):
+    """A mutant that is none: what it breaks is not there."""
+
+
+@dataclass(frozen=True, slots=True)
+class Mutant:
+    """One way to break the product, in the process of the "robot" or of the "policy". `rows` have to fail by it."""
+
+    name: str
+    break_: Callable[[], None]
+    rows: tuple[str, ...]
+    where: str = "robot"
+
+
+def break_product(name: str) -> None:
+    """Break it in this way, in this process. Raises `MutantError` if that is not possible any more."""
+    mutant = next((mutant for mutant in MUTANTS if mutant.name == name), None)
+    if mutant is None:
+        raise MutantError(f"there is no mutant '{name}'", f"There are: {'; '.join(one.name for one in MUTANTS)}.")
+    mutant.break_()
+
+
+def swap(owner: Any, name: str, new: Any) -> Any:
+    """Put something else in the place of an attribute; returns what was there. Raises `MutantError` if nothing was."""
+    if not hasattr(owner, name):
+        raise MutantError(
+            f"{getattr(owner, '__name__', type(owner).__name__)} has no '{name}' any more", "Write this mutant anew."
+        )
+    old = getattr(owner, name)
+    setattr(owner, name, new)
+    return old
+
+
+def after(owner: Any, name: str, then: Callable[..., Any]) -> None:
+    """Call `then(result, *arguments)` after a method, and return what that does."""
+    old = swap(owner, name, None)
+    setattr(owner, name, lambda *words, **named: then(old(*words, **named), *words, **named))
+
+
+def before(owner: Any, name: str, first: Callable[..., Any]) -> None:
+    """Call `first` with the arguments before a method."""
+    old = swap(owner, name, None)
+
+    def run(*words: Any, **named: Any) -> Any:
+        first(*words, **named)
+        return old(*words, **named)
+
+    setattr(owner, name, run)
+
+
+def rewrite(*changes: tuple[str, str, str]) -> Callable[[], None]:
+    """Change the governor's table: in this state, this event leads to that state, and motion is allowed there."""
+
+    def break_() -> None:
+        from hal.governor import TRANSITIONS, Event, State
+        from hal.messages import Reason
+
+        for state, event, then in changes:
+            key = State(state), Event(event)
+            if key not in TRANSITIONS:
+                raise MutantError(f"the governor's table has no {key}", "Write this mutant anew.")
+            TRANSITIONS[key] = (State(then), Reason.OK)
+
+    return break_
+
+
+def without_objection(*reasons: str) -> Callable[[], None]:
+    """Refuse no command for these reasons."""
+
+    def break_() -> None:
+        from hal.governor import Governor
+
+        after(Governor, "_objection", lambda objection, *_: None if objection in reasons else objection)
+
+    return break_
+
+
+def constant(module: str, name: str, value: float) -> Callable[[], None]:
+    """Change a number of the product."""
+
+    def break_() -> None:
+        from importlib import import_module
+
+        swap(import_module(module), name, value)
+
+    return break_
+
+
+def obey_by_arrival() -> None:
+    """Take every command for as young as its arrival."""
+    from hal import inlet
+
+    old = swap(inlet, "_command", None)
+    inlet._command = lambda received, source, now_s: replace(old(received, source, now_s), stamp_s=now_s)
+
+
+def wait_longer() -> None:
+    """Let a command drive for two seconds."""
+    from hal.governor import Governor
+
+    def lengthen(_: None, governor: Any, *__: Any) -> None:
+        swap(governor, "_timeouts_s", dict.fromkeys(governor._timeouts_s, PATIENT_S))
+
+    after(Governor, "__init__", lengthen)
+
+
+def let_policy_take_over() -> None:
+    """Take a hand that falls silent for one that let go."""
+    from hal.governor import Governor
+    from hal.messages import Source
+
+    def forgive(governor: Any, *_: Any) -> None:
+        if (hand := governor._live.get(Source.TELEOP)) is not None:
+            governor._live[Source.TELEOP] = replace(hand, released=True)
+
+    before(Governor, "_expire", forgive)
+
+
+def obey_nonsense() -> None:
+    """Take what is not a number for a velocity."""
+    from hal import governor
+
+    swap(governor, "_is_finite", lambda _: True)
+
+
+def see_through() -> None:
+    """Let the protective field allow everything."""
+    from hal import governor
+
+    swap(governor, "limit_speed", lambda *words: (words[2], ""))
+
+
+def never_time_out_in_the_base() -> None:
+    """Let the base's driver repeat a command for ever."""
+    from robot.core2.device import Core2
+
+    def lengthen(_: None, base: Any, *__: Any) -> None:
+        swap(base, "_until_s", math.inf)
+
+    after(Core2, "drive", lengthen)
+
+
+def freeze_the_guard() -> None:
+    """Let the guard never strike."""
+    from robot.core2.guard import Guard
+
+    after(Guard, "__init__", lambda _, guard, *__: os.kill(guard._process.pid, signal.SIGSTOP))
+
+
+def run_ahead() -> None:
+    """Let a client believe that it is later than it is."""
+    from hal.clock import ClockEstimate
+
+    after(ClockEstimate, "now", lambda now_s, *_: now_s + 0.09)
+
+
+MUTANTS = (
+    Mutant(
+        "neutral-first is skipped",
+        rewrite(("stopped", "motion", "armed"), ("disarmed", "motion", "armed")),
+        ("black-out of 1 s", "commander frozen (SIGSTOP)", "commands of nan", "emergency stop"),
+    ),
+    Mutant("a second commander is obeyed", without_objection("another commander"), ("second commander",)),
+    Mutant("an old epoch is obeyed", without_objection("old epoch"), ("commander with an old epoch",)),
+    Mutant(
+        "any neutral command leaves the emergency stop",
+        rewrite(("emergency", "neutral", "armed")),
+        ("emergency stop under motion and neutrals",),
+    ),
+    Mutant(
+        "releasing the emergency stop arms",
+        rewrite(("emergency", "released", "armed")),
+        ("emergency stop",),
+    ),
+    Mutant(
+        "age counts from arrival",
+        obey_by_arrival,
+        ("link delayed more and more", "commands recorded and replayed"),
+    ),
+    Mutant(
+        "late commands are obeyed",
+        without_objection("late", "out of order"),
+        ("commands forged with an old time",),
+    ),
+    Mutant("commands of three seconds ahead are obeyed", constant("hal.governor", "AHEAD_S", 3.0),
+           ("stamps half a second ahead",)),
+    Mutant("the client's clock runs ahead", run_ahead, ("commander frozen (SIGSTOP)",), where="policy"),
+    Mutant("the time-out is two seconds", wait_longer, ("commander frozen (SIGSTOP)", "black-out of 1 s")),
+    Mutant("the watchdog sleeps", constant("hal.serve_realtime", "WATCHDOG_S", FOREVER_S),
+           ("commander frozen (SIGSTOP)",)),
+    Mutant("a hand that falls silent lets go", let_policy_take_over, ("hand's bridge killed (kill -9)",)),
+    Mutant("what is not a number is obeyed", obey_nonsense, ("commands of nan",)),
+    Mutant("the protective field sees nothing", see_through, ("lidar freezes, and the commander drives on",)),
+    Mutant("a loop that hangs is kept alive", constant("hal.remote_realtime", "DECISION_S", FOREVER_S),
+           ("commander's loop hangs",), where="policy"),
+    Mutant("the base's driver repeats for ever", never_time_out_in_the_base, ("robot's governor hangs",)),
+    Mutant("the guard never strikes", freeze_the_guard, ("robot's process frozen (SIGSTOP)",)),
+)  # fmt: skip
