@@ -16,7 +16,7 @@ from tools.cli import main
 from tools.processes import free_port
 from tools.relay import Narrows, Relay
 from tools.stop_test.cull import cull, judge_mutant, rows_of
-from tools.stop_test.journal import Heard, Journal, JournalWriter, Said, Sent, Truth, Wheels, read_journal
+from tools.stop_test.journal import Heard, Journal, JournalReader, JournalWriter, Said, Sent, Truth, Wheels
 from tools.stop_test.matrix import Matrix, missing
 from tools.stop_test.mutants import MUTANTS, MutantError, break_product, swap
 from tools.stop_test.rows import ROWS
@@ -256,35 +256,39 @@ def test_what_has_to_be_counted_and_is_not_fails():
 
 
 def test_a_journal_reads_back_in_order_up_to_a_torn_end(tmp_path):
-    path = tmp_path / "journal.bin"
-    writer, other = JournalWriter(path), JournalWriter(path)
+    reader = JournalReader(tmp_path / "journal")
+    writers = [JournalWriter(reader.folder, name) for name in ("robot", "driver")]
     records = [
         Sent(1.0, "hand", 0.2, 1e-4),
         Heard(1.1, 0.2, 1e-4),
         Wheels(1.2, 0.2, 1e-4),
         Said(1.3, Reason.ESTOP, moving=False),
         Truth(1.4, 1.0, 2.0, 0.2),
+        Sent(1.5, "driver", 0.0, 0.0),
     ]
-    writer.note(Truth(9.0, 0.0, 0.0, 0.0))
-    start = path.stat().st_size
-    for record in reversed(records):
-        other.note(record)
-    for one in (writer, other):
-        one.close()
-    with path.open("ab") as file:
+    writers[0].note(Truth(9.0, 0.0, 0.0, 0.0))
+    reader.skip()
+    for number, record in enumerate(reversed(records)):
+        writers[number % 2].note(record)
+    for writer in writers:
+        writer.close()
+    with (reader.folder / "robot.bin").open("ab") as file:
         file.write(b"torn")
-    journal = read_journal(path, start)
-    assert [journal.sent, journal.heard, journal.wheels, journal.said, journal.truth] == [[one] for one in records]
+    journal = reader.read()
+    assert journal.sent == [records[0], records[5]]
+    assert [journal.heard, journal.wheels, journal.said, journal.truth] == [[one] for one in records[1:5]]
 
 
 def test_a_mark_tells_one_command_from_the_other_and_moves_nothing(tmp_path):
-    pens = [Pen(tmp_path / "journal.bin", who) for who in ("driver", "intruder")]
+    reader = JournalReader(tmp_path / "journal")
+    pens = [Pen(reader.folder, who) for who in ("driver", "intruder")]
     twists = [pen.mark(Twist(0.2, angular)) for _ in range(50) for pen in pens for angular in (0.0, 1.0, -1.0)]
-    sent = read_journal(tmp_path / "journal.bin").sent
-    assert len({one.angular_rad_s for one in sent}) == len(twists)
+    assert len({one.angular_rad_s for one in reader.read().sent}) == len(twists)
     assert all(min(abs(twist.angular_rad_s - to) for to in (0.0, 1.0, -1.0)) < 1e-3 for twist in twists)
     assert all(abs(twist.angular_rad_s) <= 1.0 for twist in twists)
     assert pens[0].mark(Twist(0.0, 0.0)) == Twist(0.0, 0.0)
+    for pen in pens:
+        pen.close()
 
 
 def test_rows_have_names_of_their_own_and_those_of_a_setup_stay_together():

@@ -26,7 +26,7 @@ from tools.stop_test import driver, hand, launch, robot, world
 from tools.stop_test.acts import StopTestError
 from tools.stop_test.control import ASK_TIME, TIME, tell
 from tools.stop_test.intruder import Intruder
-from tools.stop_test.journal import Journal, read_journal
+from tools.stop_test.journal import Journal, JournalReader
 from tools.stop_test.mutants import Mutant
 from tools.stop_test.setups import Setup, clock_library
 
@@ -56,15 +56,14 @@ class ProcessBench:
         self._profile_name = setup.profile or profile
         self.profile: RobotProfile = load_profile(self._profile_name)
         self.name, self._port, self._front = f"stop_{free_port()}", free_port(), free_port()
-        self.journal = folder / "journal.bin"
+        self._journal = JournalReader(folder / "journal")
         self._ports = {role: free_port() for role in READY}
         self._running: dict[str, ChildProcess] = {}
         self._tested, self._runs, self._certificate = POLICY, 0, LAPTOP
         self._expires = datetime.now(UTC)
-        self._noted_before = 0  # bytes of the journal, by earlier trials
         self._keys = self._make_keys() if setup.keys else None
         if setup.drivers:
-            words = [self._profile_name, str(self.journal), str(self._ports[WORLD]), str(folder)]
+            words = [self._profile_name, str(self._journal.folder), str(self._ports[WORLD]), str(folder)]
             self._run_module(WORLD, world.__name__, words)
         self.restart_robot()
         behind = self._port
@@ -78,7 +77,7 @@ class ProcessBench:
         stack.callback(self.observer.close)
         self.observer.ask(INFO)
         self._applied, self._reports = self.observer.reader(APPLIED), self.observer.reader(DIAGNOSTICS)
-        self.intruder = Intruder(self.observer, self.journal, self._keys)
+        self.intruder = Intruder(self.observer, self._journal.folder, self._keys)
         stack.callback(self.intruder.rest)
 
     @property
@@ -115,7 +114,8 @@ class ProcessBench:
 
     def restart_robot(self) -> None:
         """Start the robot's process."""
-        words = [self.name, f"127.0.0.1:{self._port}", self._profile_name, str(self.journal), str(self._ports[ROBOT])]
+        words = [self.name, f"127.0.0.1:{self._port}", self._profile_name]
+        words += [str(self._journal.folder), str(self._ports[ROBOT])]
         if self._setup.drivers:
             words += [str(self._folder), self._running[WORLD].output().partition(world.READY)[2].split()[0]]
         self._run_module(ROBOT, robot.__name__, words)
@@ -155,7 +155,7 @@ class ProcessBench:
     def drive(self, *, by_hand: bool, certificate: str) -> None:
         """Put the robot back to its start and get it going. Raises `StopTestError` if it does not."""
         self._tested = HAND if by_hand else POLICY
-        self._noted_before = self.journal.stat().st_size
+        self._journal.skip()
         if self._setup.drivers:
             tell(self._ports[WORLD], "reset")
             time.sleep(SETTLE_S)
@@ -182,7 +182,7 @@ class ProcessBench:
 
     def noted(self) -> Journal:
         """What was noted since the robot was put back to its start."""
-        return read_journal(self.journal, start=self._noted_before)
+        return self._journal.read()
 
     def refused(self, reasons: tuple[str, ...]) -> int:
         """How much was refused so far for one of these reasons, by the robot's next report. Raises `StopTestError`."""
@@ -253,7 +253,7 @@ class ProcessBench:
         tell(self._ports[role], "go")
 
     def _run_driver(self) -> None:
-        words = [self.name, f"127.0.0.1:{self._front}", str(self._ports[POLICY]), str(self.journal)]
+        words = [self.name, f"127.0.0.1:{self._front}", str(self._ports[POLICY]), str(self._journal.folder)]
         self._run_module(POLICY, driver.__name__, words)
 
     def _wait_until_it_drives(self, role: str) -> None:
@@ -285,7 +285,7 @@ class ProcessBench:
 
     def _python(self, role: str, module: str, words: list[str], noted: str | None) -> list[str]:
         """Command that starts a module, with what is peculiar to the setup, the mutant and the journal."""
-        options = [] if noted is None else ["--note", str(self.journal), noted]
+        options = [] if noted is None else ["--note", str(self._journal.folder), noted]
         if self._mutant is not None and self._mutant.where == role:
             options += ["--mutant", self._mutant.name]
         if self._setup.clocks:

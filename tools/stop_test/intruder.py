@@ -122,6 +122,12 @@ class Intruder:
             process.communicate()
         self._background, self._floods, self._ended = [], [], threading.Event()
 
+    def close(self) -> None:
+        """End everything."""
+        self.rest()
+        self._pen.close()
+        self._thumb.close()
+
     def put_plainly(self) -> None:
         """Put with nothing but zenoh, as a script does that knows the key and has no certificate."""
         config = zenoh.Config()

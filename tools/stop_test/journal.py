@@ -1,6 +1,6 @@
 """What the processes under test write down: what was sent and by whom, what arrived, what the wheels got.
 
-Fixed records in one file, which every process appends to and which is written through at once. The times are this
+Fixed records in a folder with one file for each writer, written through at once. The times are this
 machine's monotonic clock, which all processes share. Nothing in it is taken from what the product says about itself,
 except the governor's reasons (`Said`).
 """
@@ -12,6 +12,7 @@ from pathlib import Path
 
 from hal.messages import Reason
 
+SUFFIX = ".bin"
 _LAYOUT = struct.Struct("<Bdddd")
 REASONS = tuple(Reason)
 MARK_RAD_S = 1e-3  # what turns more slowly than this only carries a sender's mark
@@ -95,10 +96,10 @@ class Journal:
 
 
 class JournalWriter:
-    """Appends records; may be called from several threads, and several processes may write one file."""
+    """Appends records to one writer's file of the journal in `folder`; may be called from several threads."""
 
-    def __init__(self, path: Path) -> None:
-        self._file = path.open("ab", buffering=0)
+    def __init__(self, folder: Path, writer: str) -> None:
+        self._file = (folder / f"{writer}{SUFFIX}").open("ab", buffering=0)
         self._lock = threading.Lock()
 
     def note(self, record: Record) -> None:
@@ -111,13 +112,34 @@ class JournalWriter:
         self._file.close()
 
 
-def read_journal(path: Path, start: int = 0) -> Journal:
-    """Return what was noted, leaving out the first `start` bytes."""
-    with path.open("rb") as file:
-        file.seek(start - start % _LAYOUT.size)
-        data = file.read()
-    whole = len(data) - len(data) % _LAYOUT.size
-    records = [_unpack(*values) for values in _LAYOUT.iter_unpack(data[:whole])]
+class JournalReader:
+    """Reads what all writers have noted in `folder`, which it makes, since the last `skip`."""
+
+    def __init__(self, folder: Path) -> None:
+        self.folder = folder
+        folder.mkdir(parents=True)
+        self._starts: dict[Path, int] = {}
+
+    def skip(self) -> None:
+        """Leave out what has been noted up to now."""
+        self._starts = {path: path.stat().st_size // _LAYOUT.size for path in self._files()}
+
+    def read(self) -> Journal:
+        """Return what was noted since."""
+        return _journal([record for path in self._files() for record in self._records(path)])
+
+    def _files(self) -> list[Path]:
+        return sorted(self.folder.glob(f"*{SUFFIX}"))
+
+    def _records(self, path: Path) -> list[Record]:
+        with path.open("rb") as file:
+            file.seek(self._starts.get(path, 0) * _LAYOUT.size)
+            data = file.read()
+        whole = len(data) - len(data) % _LAYOUT.size
+        return [_unpack(*values) for values in _LAYOUT.iter_unpack(data[:whole])]
+
+
+def _journal(records: list[Record]) -> Journal:
     journal = Journal()
     for record in sorted(records, key=lambda one: one.time_s):
         match record:

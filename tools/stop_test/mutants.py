@@ -41,9 +41,7 @@ def break_product(name: str) -> None:
 def swap(owner: Any, name: str, new: Any) -> Any:
     """Put something else in the place of an attribute; returns what was there. Raises `MutantError` if nothing was."""
     if not hasattr(owner, name):
-        raise MutantError(
-            f"{getattr(owner, '__name__', type(owner).__name__)} has no '{name}' any more", "Write this mutant anew."
-        )
+        raise MutantError(f"{owner} has no '{name}' any more", "Write this mutant anew.")
     old = getattr(owner, name)
     setattr(owner, name, new)
     return old

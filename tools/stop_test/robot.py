@@ -126,9 +126,9 @@ def small_pictures(profile: RobotProfile) -> RobotProfile:
     return msgspec.structs.replace(profile, camera=camera)
 
 
-def main(name: str, endpoint: str, profile_name: str, journal_path: str, control_port: str, *devices: str) -> None:
+def main(name: str, endpoint: str, profile_name: str, journal_folder: str, control_port: str, *devices: str) -> None:
     """Serve until told to stop."""
-    profile, journal = small_pictures(load_profile(profile_name)), JournalWriter(Path(journal_path))
+    profile, journal = small_pictures(load_profile(profile_name)), JournalWriter(Path(journal_folder), "robot")
     robot = open_drivers(profile, *devices) if devices else BreakableTwin(profile, journal)
     watched = WatchedRobot(robot, journal)
 

@@ -19,10 +19,10 @@ TICK_S, TICKS = 1e-6, 10**9  # marks return after 1,000 s, long after their jour
 
 
 class Pen:
-    """Marks and notes what one sender sends."""
+    """Marks what one sender sends, and notes it in its own file of the journal in `folder`."""
 
-    def __init__(self, journal: Path, who: str) -> None:
-        self._journal = JournalWriter(journal)
+    def __init__(self, folder: Path, who: str) -> None:
+        self._journal = JournalWriter(folder, who)
         self._who = who
         self._mark_rad_s = (1 + SENDERS.index(who)) * SENDER_RAD_S
 
@@ -36,10 +36,14 @@ class Pen:
         self._journal.note(Sent(now_s, self._who, twist.linear_m_s, twist.angular_rad_s))
         return twist
 
+    def close(self) -> None:
+        """Note no more."""
+        self._journal.close()
 
-def note_commands(journal: Path, who: str) -> None:
+
+def note_commands(folder: Path, who: str) -> None:
     """From now on note every command that this process publishes."""
-    pen, plain = Pen(journal, who), Bus.publisher
+    pen, plain = Pen(folder, who), Bus.publisher
 
     def publisher(bus: Bus, topic: Any, *more: Any) -> Publisher[Any]:
         made = plain(bus, topic, *more)

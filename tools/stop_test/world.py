@@ -111,10 +111,10 @@ class Devices(WiredTwin):
         return np.full_like(distances, NEAR_M) if self.obstacle else distances
 
 
-def main(profile_name: str, journal_path: str, control_port: int, folder: str) -> None:
+def main(profile_name: str, journal_folder: str, control_port: int, folder: str) -> None:
     """Be the devices until told to stop."""
     twin = NotedTwin(small_pictures(load_profile(profile_name)), "corridor", realtime_factor=1.0, renderer="tiny")
-    twin.journal = JournalWriter(Path(journal_path))
+    twin.journal = JournalWriter(Path(journal_folder), "world")
     devices = Devices(twin, Path(folder))
     try:
         listen(control_port, devices.hear)
