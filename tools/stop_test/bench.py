@@ -22,7 +22,7 @@ from hal.profile import RobotProfile, load_profile
 from hal.topics import APPLIED, DIAGNOSTICS, INFO, RESET
 from tools import relay
 from tools.processes import ChildProcess, free_port, lira_command
-from tools.stop_test import driver, hand, launch, robot, world
+from tools.stop_test import driver, hand, launch, pulse, robot, world
 from tools.stop_test.acts import StopTestError
 from tools.stop_test.control import ASK_TIME, TIME, tell
 from tools.stop_test.intruder import Intruder
@@ -40,9 +40,9 @@ CLOCK_S = 6.0
 NEAR_S = 60.0
 ANSWER_S = 5.0
 RELEASE_S = 1.0
-BRIEF_S = 12.0
+BRIEF_S = 10.0
 POLL_S = 0.02
-POLICY, HAND, ROBOT, WORLD, LINK = "policy", "hand", "robot", "world", "link"
+POLICY, HAND, ROBOT, WORLD, LINK, PULSE = "policy", "hand", "robot", "world", "link", "pulse"
 LAPTOP, GUEST, DRIVING = "laptop", "guest", ("brief", "leaver")
 READY = {POLICY: driver.READY, HAND: hand.READY, ROBOT: robot.READY, WORLD: world.READY}
 NOTED = {POLICY: "driver", HAND: "hand"}
@@ -62,6 +62,8 @@ class ProcessBench:
         self._tested, self._runs, self._certificate = POLICY, 0, LAPTOP
         self._expires = datetime.now(UTC)
         self._keys = self._make_keys() if setup.keys else None
+        command = [sys.executable, "-P", "-m", pulse.__name__, str(self._journal.folder)]
+        self._run(PULSE, command, pulse.READY)
         if setup.drivers:
             words = [self._profile_name, str(self._journal.folder), str(self._ports[WORLD]), str(folder)]
             self._run_module(WORLD, world.__name__, words)

@@ -1,5 +1,6 @@
 """Somebody else on the bus, who means no good; with keys, also somebody who has none, or not the right ones."""
 
+import contextlib
 import signal
 import subprocess
 import sys
@@ -14,7 +15,7 @@ from hal.attachment import Attachment
 from hal.bus import Bus, Received
 from hal.codec import encode
 from hal.errors import BusError
-from hal.estop import release_estop
+from hal.estop import look_at_estop, release_estop
 from hal.keys import load_keys
 from hal.messages import STOP, Applied, Twist
 from hal.topics import APPLIED, CMD_VEL, TELEOP
@@ -25,8 +26,7 @@ TIMES = 15
 PAUSE_S = 0.02
 IDLE_S = 0.05
 BACK = Twist(-0.1, 0.0)
-WAIT_S = 5.0
-ANSWER_S = 1.0
+WAIT_S, RELEASE_S = 5.0, 0.5
 OLD_S = 1.0
 DEPTH = 256
 PLAIN = {
@@ -148,14 +148,13 @@ class Intruder:
         bus.close()
 
     def release_as(self, who: str) -> None:
-        """Release the emergency stop with the certificate of another peer; an answer or none, it is all the same."""
+        """Release the emergency stop with the certificate of another peer, which may look at it; and wait a little."""
         bus = self._session_of(who)
-        try:
-            release_estop(bus, ANSWER_S)
-        except BusError:
-            pass
-        finally:
-            bus.close()
+        look_at_estop(bus, WAIT_S)
+        with contextlib.suppress(BusError):  # an answer or none, it is all the same
+            release_estop(bus, RELEASE_S)
+        time.sleep(RELEASE_S)
+        bus.close()
 
     def _session_of(self, who: str) -> Bus:
         assert self._keys is not None

@@ -81,7 +81,15 @@ class Truth:
     speed_m_s: float
 
 
-Record = Sent | Heard | Wheels | Said | Truth
+@dataclass(frozen=True, slots=True)
+class Stalled:
+    """The machine let a process that only slept wait so long, up to a time."""
+
+    time_s: float
+    stall_s: float
+
+
+Record = Stalled | Sent | Heard | Wheels | Said | Truth
 
 
 @dataclass(frozen=True, slots=True)
@@ -93,6 +101,7 @@ class Journal:
     wheels: list[Wheels] = field(default_factory=list)
     said: list[Said] = field(default_factory=list)
     truth: list[Truth] = field(default_factory=list)
+    stalled: list[Stalled] = field(default_factory=list)
 
 
 class JournalWriter:
@@ -153,6 +162,8 @@ def _journal(records: list[Record]) -> Journal:
                 journal.said.append(record)
             case Truth():
                 journal.truth.append(record)
+            case Stalled():
+                journal.stalled.append(record)
     return journal
 
 
@@ -168,6 +179,8 @@ def _pack(record: Record) -> bytes:
             return _LAYOUT.pack(3, time_s, REASONS.index(reason), moving, 0.0)
         case Truth(time_s, x_m, y_m, speed_m_s):
             return _LAYOUT.pack(4, time_s, x_m, y_m, speed_m_s)
+        case Stalled(time_s, stall_s):
+            return _LAYOUT.pack(5, time_s, stall_s, 0.0, 0.0)
 
 
 def _unpack(kind: int, time_s: float, a: float, b: float, c: float) -> Record:
@@ -177,4 +190,6 @@ def _unpack(kind: int, time_s: float, a: float, b: float, c: float) -> Record:
         return Said(time_s, REASONS[int(a)], bool(b))
     if kind == 4:
         return Truth(time_s, a, b, c)
+    if kind == 5:
+        return Stalled(time_s, a)
     return Heard(time_s, a, b) if kind == 1 else Wheels(time_s, a, b)

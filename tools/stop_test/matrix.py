@@ -15,9 +15,10 @@ from tools.stop_test.bench import SETTLE_S, ProcessBench, open_bench
 from tools.stop_test.mutants import Mutant
 from tools.stop_test.rows import Row
 from tools.stop_test.setups import Setup, clock_library
-from tools.stop_test.verdict import ASKED, Bounds, Result, Rules, Verdict, judge, summarize
+from tools.stop_test.verdict import ASKED, Bounds, Result, Rules, Verdict, judge, summarize, within
 
 ATTEMPTS = 5
+REPEATS, STALL_S = 2, 0.06
 ASKED_S = 8.0  # until motion has been asked for often enough; a link may have to come back first
 WATCH_S = 0.4  # after that: it must not move
 BEFORE_SILENCE_S = 0.3
@@ -58,15 +59,15 @@ class Matrix:
 
     def _run_row(self, bench: ProcessBench, row: Row, trials: int) -> Result:
         phases_s = [self._chance.uniform(0.0, bench.profile.period_s) for _ in range(trials)]
-        verdicts = [try_row(bench, row, phase_s) for phase_s in phases_s]
         bounds = Bounds(row.budget_s, frozenset(row.stopped_by), row.within_s, bool(row.refusal))
-        return summarize(row.name, bounds, verdicts)
+        return summarize(row.name, bounds, [try_fairly(bench, row, bounds, phase_s) for phase_s in phases_s])
 
 
 def broken(row: Row, error: Exception) -> Result:
     """What to say of a row that could not be tried."""
     nothing = Verdict(float("inf"), float("inf"), 0.0, 0, moved_unasked=False, stopped_by="nothing")
-    return summarize(row.name, Bounds(row.budget_s, frozenset()), [nothing]) | {"error": str(error)}
+    why = str(error).splitlines()[0]
+    return summarize(row.name, Bounds(row.budget_s, frozenset()), [nothing]) | {"error": f"could not be tried: {why}"}
 
 
 def missing(row: Row) -> str:
@@ -74,6 +75,16 @@ def missing(row: Row) -> str:
     if row.setup.clocks and clock_library() is None:
         return "libfaketime (Debian package libfaketime)"
     return ""
+
+
+def try_fairly(bench: ProcessBench, row: Row, bounds: Bounds, phase_s: float) -> Verdict:
+    """One trial; if it fails while the machine had no time for anybody, another, which may fail as well."""
+    verdict = try_row(bench, row, phase_s)
+    for _ in range(REPEATS):
+        if within(bounds, verdict) or verdict.stall_s < STALL_S:
+            break
+        verdict = try_row(bench, row, phase_s)
+    return verdict
 
 
 def try_row(bench: ProcessBench, row: Row, phase_s: float) -> Verdict:
@@ -132,6 +143,7 @@ def _get_going(bench: ProcessBench, row: Row, phase_s: float) -> int:
     """Drive, and return what was refused so far. A busy machine may stop the robot before the fault does: once more."""
     for _ in range(ATTEMPTS):
         bench.drive(by_hand=row.hand, certificate=row.certificate)
+        row.first(bench)
         refused = bench.refused(row.refusal) if row.refusal else 0
         time.sleep(phase_s)
         if bench.is_fast():

@@ -36,7 +36,8 @@ FIRMWARE_S = 1.2  # nobody is left but the board's own watchdog, 1.0 s after the
 class Row:
     """One row: what breaks, for `hold_s`, on which setup, and what may stop the robot.
 
-    `budget_s` is from the last command that was obeyed to zero, `within_s` from the fault. `drives` may move the robot.
+    `first` is done while it drives, and changes nothing. `budget_s` is from the last command that was obeyed to zero,
+    `within_s` from the fault. `drives` may move the robot.
     `below`: who stops it where the governor does not. `silence`: the fault alone is to change nothing, so the commander
     is frozen a moment after it, and that is measured. `resumes`: once it is mended the commander may rightly drive on,
     after a neutral command (that comes after the mending, if it `renews`); otherwise it goes on asking for motion and
@@ -53,6 +54,7 @@ class Row:
     stopped_by: tuple[str, ...] = (WATCHDOG,)
     budget_s: float = BUDGET_S
     within_s: float = float("inf")
+    first: Act = nothing
     drives: frozenset[str] = frozenset({"driver"})
     below: str = GUARD
     setup: Setup = TWIN
@@ -114,8 +116,9 @@ def flooded(kind: str, setup: Setup = TWIN, *, quick: bool = False) -> Row:
     where = "" if setup is TWIN else f" on {setup.name}"
     return Row(
         f"flood of {kind}{where}",
-        one_by_one(flood(kind), pause(1.0), KILL),
+        KILL,
         acts.rest,
+        first=one_by_one(flood(kind), pause(1.0)),
         hold_s=1.5,
         stopped_by=(WATCHDOG, REFUSAL, BASE, GUARD),
         setup=setup,
@@ -157,10 +160,11 @@ ROWS = (
         refusal=FORGED),
     Row("commands recorded and replayed", acts.replay, THAW, refusal=("late", "out of order", *FORGED)),
     Row("lease copied", acts.copy_lease, silence=True, refusal=FORGED, quick=True),
-    Row("emergency stop beside an idle ROS joystick", one_by_one(acts.idle_joystick, pause(0.3), INSIST, acts.press),
-        one_by_one(acts.release, pause(1.0), acts.rest), stopped_by=(ESTOP,), within_s=0.7, quick=True),
-    Row("commander frozen beside an idle ROS joystick", one_by_one(acts.idle_joystick, pause(0.3), FREEZE),
-        one_by_one(THAW, INSIST, pause(1.0), acts.rest)),
+    Row("emergency stop beside an idle ROS joystick", acts.press,
+        one_by_one(acts.release, pause(1.0), acts.rest), first=one_by_one(acts.idle_joystick, INSIST),
+        stopped_by=(ESTOP,), within_s=BUDGET_S, quick=True),
+    Row("commander frozen beside an idle ROS joystick", FREEZE,
+        one_by_one(THAW, INSIST, pause(1.0), acts.rest), first=acts.idle_joystick),
     Row("emergency stop", one_by_one(INSIST, acts.press), acts.release, stopped_by=(ESTOP,), within_s=BUDGET_S,
         quick=True),
     Row("emergency stop under motion and neutrals", one_by_one(acts.press, driver_does("waver")), acts.release,
@@ -229,8 +233,8 @@ ROWS = (
         refusal=("messages",), setup=KEYED),
     Row("emergency stop released by a viewer", one_by_one(acts.press, driver_does("waver")), acts.release_as("guest"),
         stopped_by=(ESTOP,), within_s=BUDGET_S, setup=KEYED, fatal=True),
-    Row("certificate runs out", one_by_one(INSIST, acts.wait_expired), hold_s=2.0, shut_out_s=1.0,
-        within_s=2.0, certificate="brief", setup=KEYED, fatal=True, trials=1),
+    Row("certificate runs out", nothing, first=one_by_one(INSIST, acts.wait_expired), hold_s=2.0, shut_out_s=1.0,
+        within_s=1.35, certificate="brief", setup=KEYED, fatal=True, trials=1),
     Row("name revoked", one_by_one(INSIST, acts.revoke("leaver")), hold_s=6.0, shut_out_s=5.0,
         within_s=5.35, certificate="leaver", setup=KEYED, fatal=True, trials=1),
 )  # fmt: skip

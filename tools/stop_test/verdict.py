@@ -66,7 +66,8 @@ class Verdict:
     """One trial. `zero_s` counts from the last command that was obeyed until the wheels got zero, inf if never.
 
     `fault_to_zero_s` counts from the fault: a sensor that freezes, say, is old before anybody can know. `asked` is how
-    often motion was asked of the robot once it was mended, `refused` how many commands were refused as they should.
+    often motion was asked of the robot once it was mended, `refused` how many commands were refused as they should,
+    `stall_s` for how long at once the machine had no time for anybody.
     """
 
     zero_s: float
@@ -77,6 +78,7 @@ class Verdict:
     stopped_by: str
     asked: int = 0
     refused: int = 0
+    stall_s: float = 0.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -122,6 +124,7 @@ def judge(journal: Journal, rules: Rules) -> Verdict:
         moved_unasked=any(not _asked_for(one, sent, zero_at_s, journal.sent, rules) for one, sent in pairs),
         stopped_by=_stopper(journal.said, zero_at_s) or rules.below,
         asked=_asked(journal, logs, max(zero_at_s, rules.mended_s), rules),
+        stall_s=max((one.stall_s for one in journal.stalled if one.time_s >= rules.began_s), default=0.0),
     )
 
 
@@ -167,35 +170,36 @@ def _path_m(points: Sequence[Truth]) -> float:
     return float(np.hypot(*np.diff(xy, axis=0).T).sum()) if len(xy) > 1 else 0.0
 
 
+def within(bounds: Bounds, verdict: Verdict) -> bool:
+    """Whether one trial went as it should."""
+    return (
+        verdict.zero_s <= bounds.budget_s
+        and verdict.fault_to_zero_s <= bounds.within_s
+        and verdict.stale_obeyed == 0
+        and not verdict.moved_unasked
+        and verdict.asked >= bounds.asked
+        and (verdict.refused > 0 or not bounds.refusal)
+        and verdict.stopped_by in bounds.stoppers
+    )
+
+
 def summarize(name: str, bounds: Bounds, verdicts: Sequence[Verdict]) -> Result:
     """Sum the trials of one row up: the worst decides."""
     zeros_s = [one.zero_s for one in verdicts]
-    worst_s, fault_s = max(zeros_s), max(one.fault_to_zero_s for one in verdicts)
-    stopped_by = {one.stopped_by for one in verdicts}
-    stale, moved = sum(one.stale_obeyed for one in verdicts), any(one.moved_unasked for one in verdicts)
-    asked, refused = min(one.asked for one in verdicts), min(one.refused for one in verdicts)
-    passed = (
-        worst_s <= bounds.budget_s
-        and fault_s <= bounds.within_s
-        and stale == 0
-        and not moved
-        and asked >= bounds.asked
-        and (refused > 0 or not bounds.refusal)
-        and stopped_by <= bounds.stoppers
-    )
+    worst_s = max(zeros_s)
     return {
         "fault": name,
         "n": len(verdicts),
         "p50_s": float(np.percentile(zeros_s, 50)) if math.isfinite(worst_s) else math.inf,
         "p99_s": float(np.percentile(zeros_s, 99)) if math.isfinite(worst_s) else math.inf,
         "max_time_to_zero_s": worst_s,
-        "fault_to_zero_s": fault_s,
+        "fault_to_zero_s": max(one.fault_to_zero_s for one in verdicts),
         "distance_m": max(one.distance_m for one in verdicts),
-        "stale_obeyed": stale,
-        "moved_unasked": moved,
-        "asked": asked,
-        "refused": refused,
-        "stopped_by": ", ".join(sorted(stopped_by)),
+        "stale_obeyed": sum(one.stale_obeyed for one in verdicts),
+        "moved_unasked": any(one.moved_unasked for one in verdicts),
+        "asked": min(one.asked for one in verdicts),
+        "refused": min(one.refused for one in verdicts),
+        "stopped_by": ", ".join(sorted({one.stopped_by for one in verdicts})),
         "budget_s": bounds.budget_s,
-        "passed": passed,
+        "passed": all(within(bounds, one) for one in verdicts),
     }
