@@ -187,14 +187,9 @@ def rival(bench: Bench) -> None:
     bench.intruder.rival()
 
 
-def replay_old(bench: Bench) -> None:
-    """Let somebody command in the commander's name, with old stamps."""
-    bench.intruder.replay_old()
-
-
-def copy_lease(bench: Bench) -> None:
-    """Let somebody command in the commander's name, with fresh stamps."""
-    bench.intruder.copy_lease()
+def forge(ahead_s: float) -> Act:
+    """Let somebody command in the commander's name, with stamps of so much ahead of now."""
+    return lambda bench: bench.intruder.forge(ahead_s)
 
 
 def idle_joystick(bench: Bench) -> None:

@@ -40,12 +40,12 @@ CLOCK_S = 6.0
 NEAR_S = 60.0
 ANSWER_S = 5.0
 RELEASE_S = 1.0
-BRIEF_S = 10.0
+BRIEF_S, KEYS_S = 10.0, 20.0
 POLL_S = 0.02
 POLICY, HAND, ROBOT, WORLD, LINK, PULSE = "policy", "hand", "robot", "world", "link", "pulse"
 LAPTOP, GUEST, DRIVING = "laptop", "guest", ("brief", "leaver")
 READY = {POLICY: driver.READY, HAND: hand.READY, ROBOT: robot.READY, WORLD: world.READY}
-NOTED = {POLICY: "driver", HAND: "hand"}
+NOTED = {HAND: "hand"}  # a driver notes by itself what it sends
 
 
 class ProcessBench:
@@ -149,10 +149,7 @@ class ProcessBench:
 
     def revoke(self, name: str) -> None:
         """Shut a name out. Raises `StopTestError` if the verb does not."""
-        command = lira_command("keys", "revoke", name, str(self._keys))
-        done = subprocess.run(command, capture_output=True, text=True, timeout=ANSWER_S * 4, check=False)
-        if done.returncode != 0:
-            raise StopTestError(f"lira keys revoke ended with status {done.returncode}", f"It wrote: {done.stderr}")
+        _keys("revoke", name, str(self._keys))
 
     def drive(self, *, by_hand: bool, certificate: str) -> None:
         """Put the robot back to its start and get it going. Raises `StopTestError` if it does not."""
@@ -194,9 +191,8 @@ class ProcessBench:
             if time.monotonic() > deadline_s:
                 raise StopTestError("the robot says nothing on diagnostics", "Look whether it still runs.")
             time.sleep(POLL_S)
-        counts = dict(pair for status in reports[-1].message.status for pair in status.values)
-        names = (name for reason in reasons for name in (f"refused: {reason}", f"refused {reason}"))
-        return sum(int(counts.get(name, 0)) for name in names)
+        values = [pair for status in reports[-1].message.status for pair in status.values]
+        return sum(int(count) for name, count in values if _refusal(name) in reasons)
 
     def renew(self, *, fatal: bool) -> None:
         """After a trial: everybody leaves; a commander that is of no use ends."""
@@ -215,13 +211,11 @@ class ProcessBench:
         time.sleep(SETTLE_S)
 
     def _make_keys(self) -> Path:
-        from tools.authority import enroll, init
-
         folder = self._folder / "keys"
-        init(folder)
-        enroll(folder, GUEST, drives=False)
+        _keys("init", str(folder))
+        _keys("enroll", GUEST, str(folder), "--viewer")
         for name in DRIVING:
-            enroll(folder, name, drives=True)
+            _keys("enroll", name, str(folder))
         return folder
 
     def _show(self, certificate: str) -> None:
@@ -309,6 +303,19 @@ class ProcessBench:
 
     def _clock_file(self, role: str) -> Path:
         return self._folder / f"{role}.clock"
+
+
+def _keys(*words: str) -> None:
+    """Run `lira keys`. Raises `StopTestError` if it does not do it."""
+    done = subprocess.run(lira_command("keys", *words), capture_output=True, text=True, timeout=KEYS_S, check=False)
+    if done.returncode != 0:
+        raise StopTestError(f"lira keys {words[0]} ended with status {done.returncode}", f"It wrote: {done.stderr}")
+
+
+def _refusal(name: str) -> str:
+    """Why something was refused, by the name of its count; "" for what is no such count."""
+    head, *rest = name.replace("refused ", "refused: ").split(": ")
+    return rest[-1] if head == "refused" and rest else ""
 
 
 @contextmanager

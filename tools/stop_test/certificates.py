@@ -15,7 +15,8 @@ from tools.authority import AUTHORITY
 def shorten(folder: Path, name: str, lifetime_s: float) -> datetime:
     """Sign one peer's certificate anew so that it runs out in so many seconds; returns when."""
     old = x509.load_pem_x509_certificate((folder / name / CERTIFICATE).read_bytes())
-    signer = load_pem_private_key((folder / AUTHORITY / KEY).read_bytes(), None)
+    own = folder / AUTHORITY / name  # a peer may have an authority of its own
+    signer = load_pem_private_key(((own if own.exists() else own.parent) / KEY).read_bytes(), None)
     assert isinstance(signer, ec.EllipticCurvePrivateKey)
     until = (datetime.now(UTC) + timedelta(seconds=lifetime_s)).replace(microsecond=0)
     builder = (

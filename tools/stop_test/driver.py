@@ -15,15 +15,13 @@ from pathlib import Path
 from queue import SimpleQueue
 
 from fusion.preprocess import Preprocessor
-from hal.attachment import Attachment
-from hal.bus import Bus
-from hal.codec import encode
+from hal.bus import Bus, Publisher
 from hal.errors import SensorError
 from hal.messages import HELD, STOP, Applied, Command, Reason, Twist
 from hal.remote import RemoteRobot
 from hal.topics import CMD_VEL
 from tools.stop_test.control import ASK_TIME, listen, print_time
-from tools.stop_test.sender import Pen
+from tools.stop_test.sender import Pen, note_commands
 
 READY = "driving by word"
 FAREWELLS = 3
@@ -36,9 +34,9 @@ STAMPS_S = {"an hour ahead": 3600.0, "an hour behind": -3600.0, "half a second a
 class Driver:
     """One commander."""
 
-    def __init__(self, robot: RemoteRobot, liar: Pen) -> None:
+    def __init__(self, robot: RemoteRobot, lies: Publisher[Twist], liar: Pen) -> None:
         self._robot = robot
-        self._liar = liar
+        self._lies, self._liar = lies, liar
         self._preprocess = Preprocessor(robot.profile)
         self._wheel = robot.bus.publisher(CMD_VEL)  # past the remote robot, which keeps back what may arm unasked
         self._applied = Applied(STOP, 0.0)
@@ -104,16 +102,17 @@ class Driver:
 
     def _lie(self, ahead_s: float) -> None:
         """Command with a wrong time: whoever obeys it obeys a liar."""
-        bus, stamp_s = self._robot.bus, self._robot.now() + ahead_s
-        attachment = Attachment(bus.epoch, self._count, round(max(stamp_s, 0.0) * 1e9))
-        bus.put_raw(CMD_VEL, encode(self._liar.mark(self._full())), attachment.to_bytes())
+        self._lies.put(self._liar.mark(self._full()), max(self._robot.now() + ahead_s, 0.0))
 
 
 def main(name: str, endpoint: str, control_port: int, journal: Path) -> None:
     """Drive by control messages."""
-    robot = RemoteRobot(Bus(name, connect=endpoint))
+    bus = Bus(name, connect=endpoint)
+    lies = bus.publisher(CMD_VEL)  # what goes out here is noted as a liar's; from now on all is the driver's
+    note_commands(journal, "driver")
+    robot = RemoteRobot(bus)
     robot.open()
-    driver = Driver(robot, Pen(journal, "liar"))
+    driver = Driver(robot, lies, Pen(journal, "liar"))
     listen(control_port, driver.hear)
     print(READY, flush=True)
     driver.run()

@@ -7,6 +7,7 @@ import sys
 import threading
 import time
 from collections.abc import Callable
+from itertools import count
 from pathlib import Path
 
 import zenoh
@@ -27,7 +28,8 @@ PAUSE_S = 0.02
 IDLE_S = 0.05
 BACK = Twist(-0.1, 0.0)
 WAIT_S, RELEASE_S = 5.0, 0.5
-OLD_S = 1.0
+EAVESDROP_S = 0.3
+AHEAD = 1000  # numbers that the commander has not come to yet
 DEPTH = 256
 PLAIN = {
     "mode": '"peer"',
@@ -60,18 +62,17 @@ class Intruder:
         """Command to back off, with fresh stamps."""
         self._repeat(lambda: self._publisher.put(self._pen.mark(BACK), self._hear().stamp_s))
 
-    def replay_old(self) -> None:
-        """Say in the commander's name what it might have said a while ago."""
-        heard = self._hear()
-        self._repeat(lambda: self._say_as(heard.epoch, max(heard.seq - 1, 0), heard.stamp_s - OLD_S))
-
-    def copy_lease(self) -> None:
-        """Command in the commander's name, with fresh stamps."""
-        heard = self._hear()
-        self._repeat(lambda: self._say_as(heard.epoch, self._hear().seq + 1, self._hear().stamp_s))
+    def forge(self, ahead_s: float) -> None:
+        """Command in the commander's name, as whoever listens to it can, with stamps of so much ahead of now."""
+        self.record(EAVESDROP_S)
+        sent = [received.attachment for received in self._recorded if received.attachment is not None]
+        self._recorded = []
+        epoch, seq = (sent[-1].epoch, sent[-1].seq) if sent else (0, 0)
+        numbers = count(seq + AHEAD)
+        self._repeat(lambda: self._say_as(epoch, next(numbers), self._hear().stamp_s + ahead_s))
 
     def record(self, for_s: float) -> None:
-        """Listen to what the commander says, as whoever is let in as a watcher can."""
+        """Listen to what the commander says, as whoever is let in as a watcher may."""
         watch = Bus(self._bus.robot, connect=self._bus.endpoint, watch=True)
         reader, until_s = watch.reader(CMD_VEL, DEPTH), time.monotonic() + for_s
         while time.monotonic() < until_s:

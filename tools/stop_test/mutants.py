@@ -8,9 +8,11 @@ import os
 import signal
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from importlib import import_module
 from typing import Any
 
 from hal.errors import LiraError
+from hal.messages import Reason, Source
 
 FOREVER_S = 1e9
 PATIENT_S = 2.0
@@ -68,14 +70,13 @@ def rewrite(*changes: tuple[str, str, str]) -> Callable[[], None]:
     """Change the governor's table: in this state, this event leads to that state, and motion is allowed there."""
 
     def break_() -> None:
-        from hal.governor import TRANSITIONS, Event, State
-        from hal.messages import Reason
-
+        governor = import_module("hal.governor")
+        table = governor.TRANSITIONS
+        keys = {(str(state), str(event)): (state, event) for state, event in table}
         for state, event, then in changes:
-            key = State(state), Event(event)
-            if key not in TRANSITIONS:
-                raise MutantError(f"the governor's table has no {key}", "Write this mutant anew.")
-            TRANSITIONS[key] = (State(then), Reason.OK)
+            if (state, event) not in keys:
+                raise MutantError(f"the governor's table has no {event} of {state}", "Write this mutant anew.")
+            table[keys[state, event]] = (governor.State(then), Reason.OK)
 
     return break_
 
@@ -95,8 +96,6 @@ def constant(module: str, name: str, value: float) -> Callable[[], None]:
     """Change a number of the product."""
 
     def break_() -> None:
-        from importlib import import_module
-
         swap(import_module(module), name, value)
 
     return break_
@@ -104,10 +103,10 @@ def constant(module: str, name: str, value: float) -> Callable[[], None]:
 
 def obey_by_arrival() -> None:
     """Take every command for as young as its arrival."""
-    from hal import inlet
+    from hal.governor import Governor
 
-    old = swap(inlet, "_command", None)
-    inlet._command = lambda received, source, now_s: replace(old(received, source, now_s), stamp_s=now_s)
+    old = swap(Governor, "submit", None)
+    setattr(Governor, "submit", lambda governor, command, now_s: old(governor, replace(command, stamp_s=now_s), now_s))  # noqa: B010
 
 
 def wait_longer() -> None:
@@ -123,7 +122,6 @@ def wait_longer() -> None:
 def let_policy_take_over() -> None:
     """Take a hand that falls silent for one that let go."""
     from hal.governor import Governor
-    from hal.messages import Source
 
     def forgive(governor: Any, now_s: float, grace_s: float) -> None:
         hand = governor._live.get(Source.TELEOP)
@@ -179,6 +177,52 @@ def run_ahead() -> None:
     after(ClockEstimate, "now", lambda now_s, *_: now_s + 0.09)
 
 
+def arm_by_an_idle_hand() -> None:
+    """Take the zero of a hand that has let go for a wish to drive."""
+    from hal.governor import Governor
+
+    def arm(_: None, governor: Any, command: Any, *__: Any) -> None:
+        if command.source is Source.TELEOP and command.released:
+            governor._fire(import_module("hal.governor").Event.NEUTRAL)
+
+    after(Governor, "_accept", arm)
+
+
+def never_miss_a_device() -> None:
+    """Let the governor hear of no device that is lost."""
+    from hal.governor import Governor
+
+    swap(Governor, "note_devices", lambda *_: None)
+
+
+def poll_for_ever() -> None:
+    """Read all there is of a topic, however much comes meanwhile, and all of it."""
+    bus = import_module("hal.bus")
+    old = swap(bus.Bus, "reader", None)
+    bus.Bus.reader = lambda self, topic, *_: old(self, replace(topic, max_bytes=1 << 30), 1 << 20)
+    swap(import_module("hal.session"), "_size_limits", lambda *_: [])
+
+
+def promote_viewers() -> None:
+    """Take every viewer for an operator."""
+    keys = import_module("hal.keys")
+    after(keys, "load_roles", lambda roles, *_: roles and dict.fromkeys(roles, keys.Role.OPERATOR))
+
+
+def keep_expired_links() -> None:
+    """Let a link live longer than the certificate that it was opened with."""
+    from hal.keys import Keys
+
+    after(Keys, "link_config", lambda config, *_: config | {"close_link_on_expiration": False})
+
+
+def never_read_keys_again() -> None:
+    """Believe for ever who was enrolled at the start."""
+    from hal.keys import Keys
+
+    swap(Keys, "changed", lambda _: False)
+
+
 MUTANTS = (
     Mutant(
         "neutral-first is skipped",
@@ -219,4 +263,14 @@ MUTANTS = (
            ("commander's loop hangs",), where="policy"),
     Mutant("the base's driver repeats for ever", never_time_out_in_the_base, ("robot's governor hangs",)),
     Mutant("the guard never strikes", freeze_the_guard, ("robot's process frozen (SIGSTOP)",)),
+    Mutant("an idle hand arms", arm_by_an_idle_hand,
+           ("emergency stop beside an idle ROS joystick", "commander frozen beside an idle ROS joystick")),
+    Mutant("a silent board is told to go on", constant("robot.core2.contact", "SILENCE_S", 1.0),
+           ("board heard no more",)),
+    Mutant("a lost device is not missed", never_miss_a_device, ("board reset, up after 1.1 s",)),
+    Mutant("a device that is back arms", rewrite(("lost", "found", "armed")), ("board reset, up after 1.1 s",)),
+    Mutant("a poll has no end", poll_for_ever, ("flood of samples of 1 MB",)),
+    Mutant("a viewer may do all", promote_viewers, ("emergency stop released by a viewer",)),
+    Mutant("links outlive their certificates", keep_expired_links, ("certificate runs out",)),
+    Mutant("who is revoked stays", never_read_keys_again, ("name revoked",)),
 )  # fmt: skip
