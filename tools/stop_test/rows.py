@@ -210,7 +210,9 @@ ROWS = (
         trials=1),
     Row("board heard no more", one_by_one(INSIST, world_does("board mute")), REPAIRED, hold_s=2.5,
         stopped_by=NO_DEVICE, budget_s=WATCHED_S, within_s=WATCHED_S, below=BASE, setup=DRIVERS),
-    Row("board hears no more", one_by_one(INSIST, world_does("board deaf")), REPAIRED, hold_s=1.5,
+    # The board does not say that it hears nothing, so nobody here can know when it hears again: the commander leaves.
+    Row("board hears no more", one_by_one(INSIST, world_does("board deaf")),
+        one_by_one(driver_does("leave"), pause(0.5), REPAIRED), hold_s=1.5,
         stopped_by=(BOARD,), budget_s=FIRMWARE_S, within_s=FIRMWARE_S, below=BOARD, setup=DRIVERS),
     Row("board lost for less than a tick", one_by_one(INSIST, world_does("board mute until asked")), hold_s=3.0,
         stopped_by=NO_DEVICE, budget_s=WATCHED_S, within_s=WATCHED_S, below=BASE, setup=DRIVERS, trials=1),
