@@ -29,7 +29,7 @@ IDLE_S = 0.05
 BACK = Twist(-0.1, 0.0)
 WAIT_S, RELEASE_S = 5.0, 0.5
 EAVESDROP_S = 0.3
-AHEAD = 1000  # numbers that the commander has not come to yet
+AHEAD = 40  # messages: numbers that the commander will come to within a few seconds
 DEPTH = 256
 PLAIN = {
     "mode": '"peer"',

@@ -36,15 +36,14 @@ FIRMWARE_S = 1.2  # nobody is left but the board's own watchdog, 1.0 s after the
 class Row:
     """One row: what breaks, for `hold_s`, on which setup, and what may stop the robot.
 
-    `first` is done while it drives, and changes nothing. `budget_s` is from the last command that was obeyed to zero,
-    `within_s` from the fault. `drives` may move the robot.
-    `below`: who stops it where the governor does not. `silence`: the fault alone is to change nothing, so the commander
-    is frozen a moment after it, and that is measured. `resumes`: once it is mended the commander may rightly drive on,
-    after a neutral command (that comes after the mending, if it `renews`); otherwise it goes on asking for motion and
-    must not get any. `hand`: the commander is a person's hand, with a policy that drives on beneath it. `refusal`: one
-    of these reasons has to be counted. `shut_out_s`: how long after the fault the commander may still be obeyed.
-    `certificate`: the commander shows this one. `fatal`: the commander is of no use afterwards. `trials`: how often, if
-    not asked otherwise. `quick`: part of the short matrix.
+    `first`: done while it drives, and changes nothing. `budget_s`: from the last command that was obeyed until the
+    wheels have zero; `within_s`: from the fault. `drives`: who may move the robot. `below`: who stops it where the
+    governor does not. `silence`: the fault alone is to change nothing, so the commander is frozen a moment after it, and
+    that is measured. `resumes`: once it is mended the commander may rightly drive on, after a neutral command (that
+    comes after the mending, if it `renews`); otherwise it asks for motion and must not get any. `hand`: the commander
+    is a person's hand, with a policy that drives on beneath it. `refusal`: one of these reasons has to be counted.
+    `shut_out_s`: how long after the fault the commander may still be obeyed. `certificate`: what it shows. `fatal`: it
+    is of no use afterwards. `trials`: how often, if not asked otherwise. `quick`: part of the short matrix.
     """
 
     name: str
@@ -75,7 +74,7 @@ THAW = acts.driver_signal(signal.SIGCONT)
 ROBOT_FREEZE, ROBOT_THAW = acts.robot_signal(signal.SIGSTOP), acts.robot_signal(signal.SIGCONT)
 SEES = (DRIVER, FIELD)  # whoever looks at the sensor first: the driver, or the protective field
 DRIVE, INSIST, WELL = driver_does("drive"), driver_does("insist"), robot_does("")
-RANDOM = bytes(range(7, 255, 3))
+RANDOM = bytes(range(7, 255, 6))  # no longer than a command
 HAND, LIRA = frozenset({"hand"}), frozenset({"fusion"})
 FORGED = ("another commander", "old epoch", "out of order", "late")
 NO_DEVICE = (WATCHDOG, BASE, FIELD, "neutral first")
