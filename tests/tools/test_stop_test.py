@@ -179,6 +179,7 @@ def test_a_robot_of_which_nobody_asked_to_move_again_has_shown_nothing():
     verdict = verdict_of(story)
     assert verdict.asked == 0
     assert not passes(verdict)
+    assert verdict_of(sound(), asked_from_s=2.26).asked == 4
 
 
 def test_of_those_who_are_shut_out_it_counts_what_they_send_and_nothing_may_be_obeyed():

@@ -2,13 +2,12 @@
 
 import contextlib
 import signal
-import subprocess
 import sys
 import time
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
-from datetime import UTC, datetime
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import msgspec
 
@@ -21,14 +20,17 @@ from hal.messages import Episode, Source
 from hal.profile import RobotProfile, load_profile
 from hal.topics import APPLIED, DIAGNOSTICS, INFO, RESET
 from tools import relay
-from tools.processes import ChildProcess, free_port, lira_command
+from tools.processes import ChildProcess, free_port
 from tools.stop_test import driver, hand, launch, pulse, robot, world
 from tools.stop_test.acts import StopTestError
 from tools.stop_test.control import ASK_TIME, TIME, tell
 from tools.stop_test.intruder import Intruder
 from tools.stop_test.journal import Journal, JournalReader
 from tools.stop_test.mutants import Mutant
-from tools.stop_test.setups import Setup, clock_library
+from tools.stop_test.setups import BRIEF, LAPTOP, Setup, clock_library
+
+if TYPE_CHECKING:
+    from tools.stop_test.keyring import Keyring
 
 READY_S = 60.0
 AGAIN_S = 5.0
@@ -40,10 +42,8 @@ CLOCK_S = 6.0
 NEAR_S = 60.0
 ANSWER_S = 5.0
 RELEASE_S = 1.0
-BRIEF_S, KEYS_S = 10.0, 20.0
 POLL_S = 0.02
 POLICY, HAND, ROBOT, WORLD, LINK, PULSE = "policy", "hand", "robot", "world", "link", "pulse"
-LAPTOP, GUEST, DRIVING = "laptop", "guest", ("brief", "leaver")
 READY = {POLICY: driver.READY, HAND: hand.READY, ROBOT: robot.READY, WORLD: world.READY}
 NOTED = {HAND: "hand"}  # a driver notes by itself what it sends
 
@@ -60,8 +60,7 @@ class ProcessBench:
         self._ports = {role: free_port() for role in READY}
         self._running: dict[str, ChildProcess] = {}
         self._tested, self._runs, self._certificate = POLICY, 0, LAPTOP
-        self._expires = datetime.now(UTC)
-        self._keys = self._make_keys() if setup.keys else None
+        self._keyring = _make_keys(folder / "keys") if setup.keys else None
         command = [sys.executable, "-P", "-m", pulse.__name__, str(self._journal.folder)]
         self._run(PULSE, command, pulse.READY)
         if setup.drivers:
@@ -74,12 +73,12 @@ class ProcessBench:
             self._link_words = [str(behind), str(self._port)]
             self.restart_link()
         self.relay = stack.enter_context(relay.Relay(self._front, behind))
-        keys = None if self._keys is None else load_keys(self._keys / LAPTOP)
+        keys = None if self._keyring is None else load_keys(self._keyring.prepare(LAPTOP))
         self.observer = Bus(self.name, connect=f"127.0.0.1:{self._port}", keys=keys)
         stack.callback(self.observer.close)
         self.observer.ask(INFO)
         self._applied, self._reports = self.observer.reader(APPLIED), self.observer.reader(DIAGNOSTICS)
-        self.intruder = Intruder(self.observer, self._journal.folder, self._keys)
+        self.intruder = Intruder(self.observer, self._journal.folder, self._keyring)
         stack.callback(self.intruder.rest)
 
     @property
@@ -145,11 +144,13 @@ class ProcessBench:
 
     def wait_expired(self) -> None:
         """Wait until the commander's certificate runs out."""
-        time.sleep(max((self._expires - datetime.now(UTC)).total_seconds(), 0.0))
+        assert self._keyring is not None
+        self._keyring.wait_expired()
 
     def revoke(self, name: str) -> None:
-        """Shut a name out. Raises `StopTestError` if the verb does not."""
-        _keys("revoke", name, str(self._keys))
+        """Shut a name out."""
+        assert self._keyring is not None
+        self._keyring.revoke(name)
 
     def drive(self, *, by_hand: bool, certificate: str) -> None:
         """Put the robot back to its start and get it going. Raises `StopTestError` if it does not."""
@@ -210,23 +211,11 @@ class ProcessBench:
             self._running.pop(POLICY).stop()
         time.sleep(SETTLE_S)
 
-    def _make_keys(self) -> Path:
-        folder = self._folder / "keys"
-        _keys("init", str(folder))
-        _keys("enroll", GUEST, str(folder), "--viewer")
-        for name in DRIVING:
-            _keys("enroll", name, str(folder))
-        return folder
-
     def _show(self, certificate: str) -> None:
-        """Have the commander show this certificate from its next start on; one that is brief, for a while."""
-        if certificate != self._certificate and POLICY in self._running:
+        """Have the commander show this certificate, and a new one if it is brief."""
+        if (certificate != self._certificate or certificate == BRIEF) and POLICY in self._running:
             self._running.pop(POLICY).stop()
         self._certificate = certificate
-        if self._keys is not None and certificate == "brief":
-            from tools.stop_test.certificates import shorten
-
-            self._expires = shorten(self._keys, certificate, BRIEF_S)
 
     def _write_clock(self, who: str, offset_s: int) -> str:
         role = ROBOT if who == "robot" else self._tested
@@ -291,8 +280,8 @@ class ProcessBench:
     def _environment(self, role: str) -> list[str]:
         """Words that start a command with what is peculiar to the setup."""
         settings = {}
-        if self._keys is not None:
-            settings[KEYS_VARIABLE] = str(self._keys / ("robot" if role == ROBOT else self._certificate))
+        if self._keyring is not None:
+            settings[KEYS_VARIABLE] = str(self._keyring.prepare(ROBOT if role == ROBOT else self._certificate))
         if self._setup.clocks:
             self._clock_file(role).write_text("+0", encoding="utf-8")
             settings["LD_PRELOAD"] = str(clock_library())
@@ -305,11 +294,10 @@ class ProcessBench:
         return self._folder / f"{role}.clock"
 
 
-def _keys(*words: str) -> None:
-    """Run `lira keys`. Raises `StopTestError` if it does not do it."""
-    done = subprocess.run(lira_command("keys", *words), capture_output=True, text=True, timeout=KEYS_S, check=False)
-    if done.returncode != 0:
-        raise StopTestError(f"lira keys {words[0]} ended with status {done.returncode}", f"It wrote: {done.stderr}")
+def _make_keys(folder: Path) -> "Keyring":
+    from tools.stop_test.keyring import Keyring
+
+    return Keyring(folder)
 
 
 def _refusal(name: str) -> str:

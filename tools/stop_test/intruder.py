@@ -9,6 +9,7 @@ import time
 from collections.abc import Callable
 from itertools import count
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import zenoh
 
@@ -22,6 +23,9 @@ from hal.messages import STOP, Applied, Twist
 from hal.topics import APPLIED, CMD_VEL, TELEOP
 from tools.stop_test import flood
 from tools.stop_test.sender import Pen
+
+if TYPE_CHECKING:
+    from tools.stop_test.keyring import Keyring
 
 TIMES = 15
 PAUSE_S = 0.02
@@ -43,9 +47,9 @@ PLAIN = {
 class Intruder:
     """Puts commands of every kind on `cmd_vel`, with what it hears from the robot. What moves wheels here is noted."""
 
-    def __init__(self, bus: Bus, journal: Path, keys: Path | None = None) -> None:
+    def __init__(self, bus: Bus, journal: Path, keyring: "Keyring | None" = None) -> None:
         self._bus = bus
-        self._keys = keys
+        self._keyring = keyring
         self._pen, self._thumb = Pen(journal, "intruder"), Pen(journal, "joystick")
         self._publisher = bus.publisher(CMD_VEL)
         self._applied = bus.reader(APPLIED)
@@ -158,8 +162,8 @@ class Intruder:
         bus.close()
 
     def _session_of(self, who: str) -> Bus:
-        assert self._keys is not None
-        return Bus(self._bus.robot, connect=self._bus.endpoint, keys=load_keys(self._keys / who))
+        assert self._keyring is not None
+        return Bus(self._bus.robot, connect=self._bus.endpoint, keys=load_keys(self._keyring.prepare(who)))
 
     def _say_as(self, epoch: int, seq: int, stamp_s: float) -> None:
         attachment = Attachment(epoch, seq, round(max(stamp_s, 0.0) * 1e9))

@@ -109,6 +109,7 @@ def try_row(bench: ProcessBench, row: Row, phase_s: float) -> Verdict:
 
 
 def _rules(bench: ProcessBench, row: Row, broken_s: float, mended_s: float) -> Rules:
+    """What may happen in this trial, of which all but the asking is over."""
     control = bench.profile.control
     timeout_s = control.teleop_timeout_s if row.hand else control.policy_timeout_s
     return Rules(
@@ -122,6 +123,7 @@ def _rules(bench: ProcessBench, row: Row, broken_s: float, mended_s: float) -> R
         resumes=row.resumes,
         renews=row.renews,
         shut_out_s=float("inf") if row.shut_out_s is None else broken_s + row.shut_out_s,
+        asked_from_s=time.monotonic(),
         below=row.below,
     )
 

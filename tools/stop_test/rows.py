@@ -23,7 +23,20 @@ from tools.stop_test.acts import (
     robot_does,
     world_does,
 )
-from tools.stop_test.setups import CLOCKS, DRIVERS, FUSION, KEYED, LEARNER, LINK, TWIN, Setup
+from tools.stop_test.setups import (
+    BRIEF,
+    CLOCKS,
+    DRIVERS,
+    FUSION,
+    GUEST,
+    KEYED,
+    LAPTOP,
+    LEARNER,
+    LEAVER,
+    LINK,
+    TWIN,
+    Setup,
+)
 from tools.stop_test.verdict import BASE, BOARD, DRIVER, ESTOP, FAREWELL, FIELD, GUARD, REFUSAL, WATCHDOG
 
 BUDGET_S = 0.35
@@ -38,8 +51,8 @@ class Row:
 
     `first`: done while it drives, and changes nothing. `budget_s`: from the last command that was obeyed until the
     wheels have zero; `within_s`: from the fault. `drives`: who may move the robot. `below`: who stops it where the
-    governor does not. `silence`: the fault alone is to change nothing, so the commander is frozen a moment after it, and
-    that is measured. `resumes`: once it is mended the commander may rightly drive on, after a neutral command (that
+    governor does not. `silence`: the fault alone is to change nothing, so the commander is frozen a moment after it,
+    and that is measured. `resumes`: once it is mended the commander may rightly drive on, after a neutral command (that
     comes after the mending, if it `renews`); otherwise it asks for motion and must not get any. `hand`: the commander
     is a person's hand, with a policy that drives on beneath it. `refusal`: one of these reasons has to be counted.
     `shut_out_s`: how long after the fault the commander may still be obeyed. `certificate`: what it shows. `fatal`: it
@@ -63,7 +76,7 @@ class Row:
     hand: bool = False
     refusal: tuple[str, ...] = ()
     shut_out_s: float | None = None
-    certificate: str = "laptop"
+    certificate: str = LAPTOP
     fatal: bool = False
     trials: int = 2
     quick: bool = field(default=False, kw_only=True)
@@ -115,9 +128,8 @@ def flooded(kind: str, setup: Setup = TWIN, *, quick: bool = False) -> Row:
     where = "" if setup is TWIN else f" on {setup.name}"
     return Row(
         f"flood of {kind}{where}",
-        KILL,
+        one_by_one(flood(kind), pause(1.0), KILL),
         acts.rest,
-        first=one_by_one(flood(kind), pause(1.0)),
         hold_s=1.5,
         stopped_by=(WATCHDOG, REFUSAL, BASE, GUARD),
         setup=setup,
@@ -184,7 +196,7 @@ ROWS = (
         resumes=True),
     Row("robot's main thread hangs", robot_does("main hangs"), silence=True, hold_s=2.0, trials=1),
     # The learner.
-    Row("lira fusion killed (kill -9)", KILL, drives=LIRA, setup=FUSION, trials=1),
+    Row("lira fusion killed (kill -9)", KILL, drives=LIRA, setup=FUSION, trials=1, quick=True),
     Row("lira fusion frozen (SIGSTOP)", FREEZE, THAW, hold_s=1.6, drives=LIRA, setup=FUSION, trials=1),
     Row("robot restarted under the learner", acts.end_robot, acts.restart_robot, drives=LIRA, setup=LEARNER,
         stopped_by=(WATCHDOG, FAREWELL), trials=1),
@@ -230,12 +242,12 @@ ROWS = (
     # Keys.
     Row("put without a certificate", acts.put_plainly, silence=True, refusal=("links",),
         setup=KEYED),
-    Row("put with a viewer's certificate", acts.put_as("guest"), silence=True,
+    Row("put with a viewer's certificate", acts.put_as(GUEST), silence=True,
         refusal=("messages",), setup=KEYED),
-    Row("emergency stop released by a viewer", one_by_one(acts.press, driver_does("waver")), acts.release_as("guest"),
+    Row("emergency stop released by a viewer", one_by_one(acts.press, driver_does("waver")), acts.release_as(GUEST),
         stopped_by=(ESTOP,), within_s=BUDGET_S, setup=KEYED, fatal=True),
     Row("certificate runs out", nothing, first=one_by_one(INSIST, acts.wait_expired), hold_s=2.0, shut_out_s=1.0,
-        within_s=1.35, certificate="brief", setup=KEYED, fatal=True, trials=1),
-    Row("name revoked", one_by_one(INSIST, acts.revoke("leaver")), hold_s=6.0, shut_out_s=5.0,
-        within_s=5.35, certificate="leaver", setup=KEYED, fatal=True, trials=1),
+        within_s=1.35, certificate=BRIEF, setup=KEYED, fatal=True, trials=1),
+    Row("name revoked", one_by_one(INSIST, acts.revoke(LEAVER)), hold_s=6.0, shut_out_s=5.0,
+        within_s=5.35, certificate=LEAVER, setup=KEYED, fatal=True, trials=1),
 )  # fmt: skip

@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 from pathlib import Path
 
+LAPTOP, GUEST, BRIEF, LEAVER = "laptop", "guest", "brief", "leaver"  # names on certificates, where there are keys
 LIBRARIES = "/usr/lib/*/faketime/libfaketimeMT.so.1", "/usr/lib*/faketime/libfaketimeMT.so.1"
 
 

@@ -44,8 +44,8 @@ class Rules:
     `drives` may move the wheels, until `broken_s` and by commands no older than `stale_s`; nobody else ever. After the
     first zero nobody may, until `mended_s` and for ever if not `resumes`; then only after a neutral command of
     `drives`, which has to come after `mended_s` if it `renews`. From `shut_out_s` on the commands that they send count
-    for nothing. `asks` are those whose wish to move, once it is mended, makes the trial one. `below`: who stopped it
-    where the governor did not.
+    for nothing. `asks` are those whose wish to move, from `asked_from_s` on, makes the trial one. `below`: who stopped
+    it where the governor did not.
     """
 
     began_s: float
@@ -57,6 +57,7 @@ class Rules:
     resumes: bool = False
     renews: bool = False
     shut_out_s: float = math.inf
+    asked_from_s: float = -math.inf
     asks: frozenset[str] = frozenset({"driver", "hand", "fusion"})
     below: str = GUARD
 
@@ -123,7 +124,7 @@ def judge(journal: Journal, rules: Rules) -> Verdict:
         stale_obeyed=sum(one.time_s - sent.time_s > rules.stale_s for one, sent in pairs if sent is not None),
         moved_unasked=any(not _asked_for(one, sent, zero_at_s, journal.sent, rules) for one, sent in pairs),
         stopped_by=_stopper(journal.said, zero_at_s) or rules.below,
-        asked=_asked(journal, logs, max(zero_at_s, rules.mended_s), rules),
+        asked=_asked(journal, logs, max(zero_at_s, rules.mended_s, rules.asked_from_s), rules),
         stall_s=max((one.stall_s for one in journal.stalled if one.time_s >= rules.began_s), default=0.0),
     )
 

@@ -20,6 +20,7 @@ examples:
 
 import argparse
 import json
+import signal
 import sys
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -52,6 +53,7 @@ def run(args: argparse.Namespace) -> int:
     from tools.verbs.bench import take_stdout, write_file
 
     output = take_stdout() if args.json == "-" else sys.stdout
+    signal.signal(signal.SIGTERM, signal.default_int_handler)  # whatever ends this ends all that it has started
     with TemporaryDirectory() as folder:
         results = try_mutants(args, Path(folder)) if args.mutants else try_rows(args, Path(folder))
     passed = all(result["caught" if args.mutants else "passed"] for result in results)
