@@ -168,13 +168,19 @@ class _Front(asyncio.DatagramProtocol):
     async def _connect(self, addr: tuple[str, int], first: bytes) -> None:
         loop = asyncio.get_running_loop()
         back = _Sender(self._relay, self._relay.from_robot)
-        back.open(lambda data: self._near.sendto(data, addr))
+        back.open(lambda data: _put(self._near, data, addr))
         there, _ = await loop.create_datagram_endpoint(
             lambda: _Back(back), remote_addr=("127.0.0.1", self._target_port)
         )
         self._relay.keep(there)
-        self._far[addr].open(there.sendto)
+        self._far[addr].open(lambda data: _put(there, data))
         self._far[addr].send(first)
+
+
+def _put(transport: asyncio.DatagramTransport, data: bytes, addr: tuple[str, int] | None = None) -> None:
+    """Send a datagram that may have been held back until the relay ends."""
+    if not transport.is_closing():
+        transport.sendto(data, addr)
 
 
 class _Back(asyncio.DatagramProtocol):

@@ -24,7 +24,7 @@ from hal.topics import APPLIED, RESET
 from tools.bench import Row, watcher
 from tools.processes import ChildProcess, free_port, lira_command
 from tools.stop_test import hand
-from tools.stop_test.control import say
+from tools.stop_test.control import tell
 
 MINUTES = 30.0
 READY_S = 60.0
@@ -167,4 +167,4 @@ def happen(what: str, bus: Bus, ear: int) -> None:
     elif what == "visit":
         Bus(bus.robot, connect=bus.endpoint).close()
     else:
-        say(ear, what)
+        tell(ear, what)

@@ -1,5 +1,7 @@
 """The stop test: break something while a robot drives, and measure when it stands.
 
-`robot` and `driver` are the processes under test, `relay` (tools/relay.py) the link between them, `faults` the table of
-what is broken, `matrix` one trial after the other, `verdict` what a trial's journal says.
+`rows` is the table of what is broken, `setups` what it is tried on, `acts` how. `robot`, `world`, `driver` and `hand`
+are the processes under test, started by `launch`, with tools/relay.py as the link between them; `sender` marks what
+they send, `journal` is what they write down. `matrix` tries one row after the other on a `bench`, `verdict` says what a
+trial's journal shows. `mutants` break the product on purpose, and `cull` sees whether the rows notice.
 """

@@ -16,6 +16,10 @@ from tools.stop_test.intruder import Intruder
 
 LEASE_GONE_S = 1.2
 HOUR_S = 3600
+CREEP_S, CREEPS = 0.02, 30
+STEP_S = 0.05
+RECORD_S = 1.0
+ENDED_S = 8.0
 
 
 class StopTestError(LiraError):
@@ -51,11 +55,20 @@ class Bench(Protocol):
     def restart_link(self) -> None:
         """Start the process in the link again."""
 
-    def tell_driver(self, word: str) -> None:
-        """Say a word to the commander under test."""
+    def tell_driver(self, message: str) -> None:
+        """Send a control message to the commander under test."""
 
-    def tell_robot(self, word: str) -> None:
-        """Say a word to the robot's devices."""
+    def tell_robot(self, message: str) -> None:
+        """Send one to the robot's process."""
+
+    def tell_world(self, message: str) -> None:
+        """Send one to the robot's devices."""
+
+    def wait_expired(self) -> None:
+        """Wait until the commander's certificate runs out."""
+
+    def revoke(self, name: str) -> None:
+        """Shut a name out, as `lira keys revoke` does."""
 
     def set_clock(self, who: str, offset_s: int) -> None:
         """Set the time of day of "robot" or "driver" so much ahead of the true one."""
@@ -81,14 +94,44 @@ def robot_signal(number: signal.Signals) -> Act:
     return lambda bench: bench.robot.signal(number)
 
 
-def driver_word(word: str) -> Act:
-    """Say a word to the commander."""
-    return lambda bench: bench.tell_driver(word)
+def driver_does(message: str) -> Act:
+    """Send the commander a control message."""
+    return lambda bench: bench.tell_driver(message)
 
 
-def robot_word(word: str) -> Act:
-    """Say a word to the robot's devices."""
-    return lambda bench: bench.tell_robot(word)
+def robot_does(message: str) -> Act:
+    """Send the robot's process a control message."""
+    return lambda bench: bench.tell_robot(message)
+
+
+def world_does(message: str) -> Act:
+    """Send the robot's devices a control message."""
+    return lambda bench: bench.tell_world(message)
+
+
+def one_by_one(*acts: Act) -> Act:
+    """Do one after the other."""
+
+    def do(bench: Bench) -> None:
+        for act in acts:
+            act(bench)
+
+    return do
+
+
+def pause(for_s: float) -> Act:
+    """Let time pass."""
+    return lambda bench: time.sleep(for_s)  # noqa: ARG005 - an act has a bench
+
+
+def flood(kind: str) -> Act:
+    """Send as much of a kind as fits through, from now on."""
+    return lambda bench: bench.intruder.flood(kind)
+
+
+def rest(bench: Bench) -> None:
+    """End what the intruder goes on with."""
+    bench.intruder.rest()
 
 
 def put(payload: bytes) -> Act:
@@ -104,6 +147,13 @@ def link(**faults: float | bool) -> Act:
             setattr(bench.relay.faults, name, value)
 
     return change
+
+
+def creep(bench: Bench) -> None:
+    """Delay the link a little more, again and again: nothing stops coming, all of it comes later and later."""
+    for count in range(1, CREEPS + 1):
+        bench.relay.faults.delay_s = count * CREEP_S
+        time.sleep(STEP_S)
 
 
 def mend_link(bench: Bench) -> None:
@@ -130,6 +180,60 @@ def restart_link(bench: Bench) -> None:
 def restart_robot(bench: Bench) -> None:
     """Start the robot's process again."""
     bench.restart_robot()
+
+
+def rival(bench: Bench) -> None:
+    """Let somebody else command."""
+    bench.intruder.rival()
+
+
+def forge(ahead_s: float) -> Act:
+    """Let somebody command in the commander's name, with stamps of so much ahead of now."""
+    return lambda bench: bench.intruder.forge(ahead_s)
+
+
+def idle_joystick(bench: Bench) -> None:
+    """Plug in a ROS joystick that nobody touches."""
+    bench.intruder.idle_joystick()
+
+
+def put_plainly(bench: Bench) -> None:
+    """Let somebody command who has no certificate."""
+    bench.intruder.put_plainly()
+
+
+def put_as(name: str) -> Act:
+    """Let somebody command who has another's certificate."""
+    return lambda bench: bench.intruder.put_as(name)
+
+
+def release_as(name: str) -> Act:
+    """Let somebody release the emergency stop who has another's certificate."""
+    return lambda bench: bench.intruder.release_as(name)
+
+
+def replay(bench: Bench) -> None:
+    """Record what the commander says, freeze it, and say all of it again."""
+    bench.intruder.record(RECORD_S)
+    bench.driver.signal(signal.SIGSTOP)
+    bench.intruder.replay_recorded()
+
+
+def wait_expired(bench: Bench) -> None:
+    """Wait until the commander's certificate runs out."""
+    bench.wait_expired()
+
+
+def revoke(name: str) -> Act:
+    """Shut a name out."""
+    return lambda bench: bench.revoke(name)
+
+
+def end_robot(bench: Bench) -> None:
+    """Tell the robot's process to end, as a service manager does, and wait until it has."""
+    bench.robot.signal(signal.SIGTERM)
+    if bench.robot.wait(ENDED_S) is None:
+        raise StopTestError("the robot's process does not end", f"It wrote:\n{bench.robot.tail()}")
 
 
 def lose_the_lease(bench: Bench) -> None:

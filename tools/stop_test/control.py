@@ -1,4 +1,4 @@
-"""Words to a process under test, as datagrams: they reach it though its bus may be broken."""
+"""Control messages to a process under test, as datagrams: they reach it though its bus may be broken."""
 
 import socket
 import threading
@@ -6,28 +6,27 @@ import time
 from collections.abc import Callable
 
 TIME = "the time of day here is "
+ASK_TIME = "what time"
 
 
-class Ear:
-    """Calls `hear` with every word that comes to a port of this machine, on a thread of its own."""
+def listen(port: int, hear: Callable[[str], None]) -> None:
+    """Call `hear` with every message that comes to a port of this machine, on a thread of its own."""
+    inbox = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+    inbox.bind(("127.0.0.1", port))
 
-    def __init__(self, port: int, hear: Callable[[str], None]) -> None:
-        self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
-        self._socket.bind(("127.0.0.1", port))
-        self._hear = hear
-        threading.Thread(target=self._run, name="ear", daemon=True).start()
-
-    def _run(self) -> None:
+    def run() -> None:
         while True:
-            self._hear(self._socket.recv(256).decode())
+            hear(inbox.recv(256).decode())
+
+    threading.Thread(target=run, name="control", daemon=True).start()
 
 
-def say(port: int, word: str) -> None:
-    """Say a word to whoever has an ear there."""
-    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as mouth:
-        mouth.sendto(word.encode(), ("127.0.0.1", port))
+def tell(port: int, message: str) -> None:
+    """Send a control message to whoever listens there."""
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as outbox:
+        outbox.sendto(message.encode(), ("127.0.0.1", port))
 
 
-def tell_time() -> None:
+def print_time() -> None:
     """Print what this process takes the time of day for."""
     print(f"{TIME}{time.time():.0f}", flush=True)

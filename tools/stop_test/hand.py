@@ -1,8 +1,8 @@
 """A person's hand under test: the bridge of `lira joystick`, with a pad that is moved by word instead of by thumbs.
 
-Words: `go` grips and pushes the stick as far as it goes; `leave` lets go.
+Control messages: `go` grips and pushes the stick as far as it goes; `leave` lets go.
 
-python -m tools.stop_test.hand NAME HOST:PORT EAR_PORT
+python -m tools.stop_test.hand NAME HOST:PORT CONTROL_PORT
 """
 
 import sys
@@ -17,7 +17,7 @@ from tools.joystick.codes import AXES, BUTTONS, EV_ABS, EV_KEY
 from tools.joystick.mapping import load_mapping
 from tools.joystick.memory import PadMemory
 from tools.joystick.wheel import Wheel
-from tools.stop_test.control import Ear
+from tools.stop_test.control import listen
 
 READY = "a hand by word"
 ANSWER_S = 5.0
@@ -25,7 +25,7 @@ REST_S = 0.3  # with the hand on and the stick at rest, which arms the robot
 CENTRE, FORWARD = 128, 0
 
 
-def main(name: str, endpoint: str, ear_port: int) -> None:
+def main(name: str, endpoint: str, control_port: int) -> None:
     """Drive by word."""
     mapping, pad = load_mapping("ps3"), PipePad()
     axis = AXES[mapping.forward.axis]
@@ -46,7 +46,7 @@ def main(name: str, endpoint: str, ear_port: int) -> None:
     watch = Bus(name, connect=endpoint, watch=True)
     wheel = Wheel(bus, watch, ANSWER_S)
     bridge = Bridge(mapping, wheel, lambda: pad, PadMemory(None))
-    Ear(ear_port, hear)
+    listen(control_port, hear)
     print(READY, flush=True)
     try:
         bridge.run(threading.Event())

@@ -2,7 +2,7 @@
 
 That is a twin, or, with the folder of a world's devices, the physical robot's drivers.
 
-python -m tools.stop_test.robot NAME HOST:PORT PROFILE JOURNAL EAR_PORT [FOLDER CAMERA_URL]
+python -m tools.stop_test.robot NAME HOST:PORT PROFILE JOURNAL CONTROL_PORT [FOLDER CAMERA_URL]
 """
 
 import signal
@@ -17,7 +17,7 @@ import numpy as np
 
 from hal.bus import Bus
 from hal.governed import GovernedRobot
-from hal.messages import Applied, Image, LaserScan, Observation
+from hal.messages import Applied, Command, Image, LaserScan, Observation
 from hal.outlet import compress
 from hal.port import Robot
 from hal.profile import RobotProfile, load_profile
@@ -25,8 +25,8 @@ from hal.refusals import count_refusals
 from hal.server import HalServer, stop_on_signal
 from robot.rosbot import Devices, Rosbot
 from sim_backend.twin import Twin
-from tools.stop_test.control import Ear, tell_time
-from tools.stop_test.journal import Given, JournalWriter, Truth
+from tools.stop_test.control import ASK_TIME, listen, print_time
+from tools.stop_test.journal import Heard, JournalWriter, Said, Truth, Wheels, moves
 
 READY = "serving"
 TRUTH_S = 0.01
@@ -36,14 +36,30 @@ MAIN_HANGS_S = 2.0
 WIDTH_PX, HEIGHT_PX = 64, 48
 
 
-class BreakableTwin(Twin):
-    """A twin whose devices fail by word; the empty word mends them."""
+class NotedTwin(Twin):
+    """A twin whose wheels are watched."""
+
+    journal: JournalWriter
+
+    def drive(self, command: Command) -> Applied:
+        """Pass it on to the wheels."""
+        began_s = time.monotonic()
+        applied = super().drive(command)
+        twist = command.twist
+        noted_s = began_s if moves(twist.linear_m_s, twist.angular_rad_s) else time.monotonic()
+        self.journal.note(Wheels(noted_s, twist.linear_m_s, twist.angular_rad_s))
+        return applied
+
+
+class BreakableTwin(NotedTwin):
+    """A twin whose devices fail by a control message; the empty one mends them."""
 
     fault = ""
     _held: Observation | None = None
 
-    def __init__(self, profile: RobotProfile) -> None:
+    def __init__(self, profile: RobotProfile, journal: JournalWriter) -> None:
         super().__init__(profile, "line", realtime_factor=1.0, renderer="tiny")
+        self.journal = journal
 
     def read(self) -> Observation:
         """Read, with the fault in it."""
@@ -66,7 +82,7 @@ class BreakableTwin(Twin):
 
 
 class BreakableDrivers(Rosbot):
-    """The physical robot, whose base driver hangs by word, with all of its threads."""
+    """The physical robot, whose base driver hangs by a control message, with all of its threads."""
 
     @property
     def fault(self) -> str:
@@ -82,7 +98,7 @@ class BreakableDrivers(Rosbot):
 
 
 class WatchedRobot(GovernedRobot):
-    """Notes down what the wheels are given. While it `hangs`, so does every thread that needs the governor."""
+    """Notes what arrives and what the governor says. While it `hangs`, so does every thread that needs the governor."""
 
     hangs = False
 
@@ -90,12 +106,17 @@ class WatchedRobot(GovernedRobot):
         super().__init__(robot)
         self._journal = journal
 
+    def submit(self, command: Command) -> None:
+        """Pass it on to the governor."""
+        self._journal.note(Heard(time.monotonic(), command.twist.linear_m_s, command.twist.angular_rad_s))
+        super().submit(command)
+
     def _actuate(self) -> Applied:
         while self.hangs:
             time.sleep(NAP_S)
         applied = super()._actuate()
-        pair = (applied.twist.linear_m_s, applied.twist.angular_rad_s)
-        self._journal.given(Given(time.monotonic(), *pair, applied.command_age_s, applied.reason))
+        moving = moves(applied.twist.linear_m_s, applied.twist.angular_rad_s)
+        self._journal.note(Said(time.monotonic(), applied.reason, moving))
         return applied
 
 
@@ -105,27 +126,23 @@ def small_pictures(profile: RobotProfile) -> RobotProfile:
     return msgspec.structs.replace(profile, camera=camera)
 
 
-def main(name: str, endpoint: str, profile_name: str, journal_path: str, ear_port: str, *devices: str) -> None:
+def main(name: str, endpoint: str, profile_name: str, journal_folder: str, control_port: str, *devices: str) -> None:
     """Serve until told to stop."""
-    profile, journal = small_pictures(load_profile(profile_name)), JournalWriter(Path(journal_path))
-    robot = open_drivers(profile, *devices) if devices else BreakableTwin(profile)
-
+    profile, journal = small_pictures(load_profile(profile_name)), JournalWriter(Path(journal_folder), "robot")
+    robot = open_drivers(profile, *devices) if devices else BreakableTwin(profile, journal)
     watched = WatchedRobot(robot, journal)
 
-    def hear(word: str) -> None:
-        watched.hangs = word == "governor hangs"
-        if word == "main hangs":
+    def hear(message: str) -> None:
+        watched.hangs = message == "governor hangs"
+        if message == "main hangs":
             signal.pthread_kill(threading.main_thread().ident or 0, signal.SIGUSR1)
-        elif word == "what time":
-            tell_time()
+        elif message == ASK_TIME:
+            print_time()
         else:
-            robot.fault = word
+            robot.fault = message
 
-    def hang(*_: object) -> None:
-        time.sleep(MAIN_HANGS_S)
-
-    signal.signal(signal.SIGUSR1, hang)  # signals are handled in the main thread
-    Ear(int(ear_port), hear)
+    signal.signal(signal.SIGUSR1, lambda *_: time.sleep(MAIN_HANGS_S))  # signals are handled in the main thread
+    listen(int(control_port), hear)
     bus = Bus(name, listen=endpoint, refusals=count_refusals())
     try:
         with stop_on_signal() as stop:
@@ -141,7 +158,7 @@ def main(name: str, endpoint: str, profile_name: str, journal_path: str, ear_por
         bus.close()
 
 
-def open_drivers(profile: RobotProfile, folder: str, camera_url: str) -> "BreakableDrivers":
+def open_drivers(profile: RobotProfile, folder: str, camera_url: str) -> BreakableDrivers:
     """Return the physical robot on the devices in a folder."""
     devices = Devices(base=f"{folder}/core2", lidar=f"{folder}/rplidar", camera=camera_url)
     return BreakableDrivers(profile, devices)
@@ -151,7 +168,7 @@ def keep_truth(twin: Twin, journal: JournalWriter) -> None:
     """Note where the robot really is, for as long as the process lives."""
     while True:
         state = twin.state()
-        journal.truth(Truth(time.monotonic(), state.x_m, state.y_m, state.linear_m_s))
+        journal.note(Truth(time.monotonic(), state.x_m, state.y_m, state.linear_m_s))
         time.sleep(TRUTH_S)
 
 

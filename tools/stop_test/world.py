@@ -1,55 +1,129 @@
 """The world of a robot with real drivers: a twin behind its devices, which notes what the base gave the wheels.
 
-It goes on whatever happens to the robot's process. Words: `reset` puts the robot back to its start.
+It goes on whatever happens to the robot's process. Control messages: `reset` puts the robot back to its start; `well`
+mends all; the others are the names in `Devices.break_`.
 
-python -m tools.stop_test.world PROFILE JOURNAL EAR_PORT FOLDER
+python -m tools.stop_test.world PROFILE JOURNAL CONTROL_PORT FOLDER
 """
 
-import math
 import sys
 import threading
-import time
+from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
-from hal.messages import STOP, Applied, Command, Episode
+import numpy as np
+
+from hal.messages import Episode
 from hal.profile import load_profile
 from hal.server import stop_on_signal
+from robot.core2.rosserial import ASK_TOPICS
 from sim_backend.emulators.bench import WiredTwin
-from sim_backend.twin import Twin
-from tools.stop_test.control import Ear
-from tools.stop_test.journal import Given, JournalWriter
-from tools.stop_test.robot import keep_truth, small_pictures
+from sim_backend.polyline import Floats
+from tools.stop_test.control import listen
+from tools.stop_test.journal import JournalWriter
+from tools.stop_test.robot import NotedTwin, keep_truth, small_pictures
 
 READY = "devices, camera at "
+NEAR_M = 0.15  # in front of the lidar: inside the protective field
+BOARD_RESETS = "board resets "
 
 
-class NotedTwin(Twin):
-    """Notes when the base gives the wheels zero; what it is given before, the robot notes."""
+class Gate:
+    """Stands between a device and its line: what is shut off does not get through. `deaf`: it hears nothing; `mute`:
+    nobody hears it. `mute_until_asked`: nor does anybody until the host asks which topics it has.
+    """
 
-    journal: JournalWriter
-    _moving = False
+    def __init__(self, unit: Any) -> None:
+        self.deaf = self.mute = self.mute_until_asked = False
+        self._receive: Callable[[bytes, float], None] = unit.receive
+        self._emit: Callable[[float], bytes] = unit.emit
+        unit.receive, unit.emit = self.receive, self.emit
 
-    def drive(self, command: Command) -> Applied:
-        """Pass it on."""
-        if self._moving and command.twist == STOP:
-            self.journal.given(Given(time.monotonic(), 0.0, 0.0, math.nan))
-        self._moving = command.twist != STOP
-        return super().drive(command)
+    def open(self) -> None:
+        """Let everything through."""
+        self.deaf = self.mute = self.mute_until_asked = False
+
+    def receive(self, data: bytes, now_s: float) -> None:
+        """Take what the host sent."""
+        if ASK_TOPICS in data:
+            self.mute_until_asked = False
+        if not self.deaf:
+            self._receive(data, now_s)
+
+    def emit(self, now_s: float) -> bytes:
+        """Return what the host gets."""
+        data = self._emit(now_s)
+        return b"" if self.mute or self.mute_until_asked else data
 
 
-def main(profile_name: str, journal_path: str, ear_port: int, folder: str) -> None:
+class Devices(WiredTwin):
+    """A twin behind wires, whose devices break by a control message."""
+
+    obstacle = False
+
+    def __init__(self, twin: NotedTwin, folder: Path) -> None:
+        super().__init__(twin, folder)
+        self.board, self.laser = Gate(self.base), Gate(self.lidar)
+
+    def hear(self, message: str) -> None:
+        """Obey a control message."""
+        if message == "reset":
+            self.reset(Episode())
+        elif message == "well":
+            self.mend()
+        elif message.startswith(BOARD_RESETS):
+            self.reset_board(float(message.removeprefix(BOARD_RESETS)))
+        else:
+            self.break_(message)
+
+    def break_(self, message: str) -> None:
+        """Break one thing."""
+        match message:
+            case "board deaf":
+                self.board.deaf = True
+            case "board mute":
+                self.board.mute = True
+            case "board mute until asked":
+                self.board.mute_until_asked = True
+            case "lidar mute":
+                self.laser.mute = True
+            case "lidar unplugged":
+                self.lidar_wire.unplug()
+            case "obstacle":
+                self.obstacle = True
+
+    def mend(self) -> None:
+        """Mend everything."""
+        self.obstacle = False
+        self.board.open()
+        self.laser.open()
+        self.lidar_wire.plug()
+
+    def reset_board(self, boot_s: float) -> None:
+        """Press the board's reset button; it is up again after `boot_s`."""
+        self.base.firmware = replace(self.base.firmware, boot_s=boot_s)
+        self.base.reset()
+
+    def _distances(self, theta_rad: Floats) -> Floats:
+        distances = super()._distances(theta_rad)
+        return np.full_like(distances, NEAR_M) if self.obstacle else distances
+
+
+def main(profile_name: str, journal_folder: str, control_port: int, folder: str) -> None:
     """Be the devices until told to stop."""
     twin = NotedTwin(small_pictures(load_profile(profile_name)), "corridor", realtime_factor=1.0, renderer="tiny")
-    twin.journal = JournalWriter(Path(journal_path))
-    wired = WiredTwin(twin, Path(folder))
+    twin.journal = JournalWriter(Path(journal_folder), "world")
+    devices = Devices(twin, Path(folder))
     try:
-        Ear(ear_port, lambda _: wired.reset(Episode()))
+        listen(control_port, devices.hear)
         threading.Thread(target=keep_truth, args=(twin, twin.journal), daemon=True).start()
         with stop_on_signal() as stop:
-            print(f"{READY}{wired.url}", flush=True)
+            print(f"{READY}{devices.url}", flush=True)
             stop.wait()
     finally:
-        wired.close()
+        devices.close()
 
 
 if __name__ == "__main__":

@@ -1,14 +1,15 @@
-"""What a fault is tried on: which robot, which commander, which link."""
+"""What a row is tried on: which robot, which commander, which link."""
 
 from dataclasses import dataclass
 from pathlib import Path
 
+LAPTOP, GUEST, BRIEF, LEAVER = "laptop", "guest", "brief", "leaver"  # names on certificates, where there are keys
 LIBRARIES = "/usr/lib/*/faketime/libfaketimeMT.so.1", "/usr/lib*/faketime/libfaketimeMT.so.1"
 
 
 @dataclass(frozen=True, slots=True)
-class Stand:
-    """One arrangement of processes. Without anything: a twin, a driver by word, and a relay between them.
+class Setup:
+    """One arrangement of processes. Without anything: a twin, a driver by control messages, and a relay between them.
 
     `profile` None: what was asked for. `fusion`: words for `lira fusion`, which then is the commander; `{run}` is a
     folder. `drivers`: the robot's are the physical ones, on the devices of a world in another process. `link`: a
@@ -24,17 +25,17 @@ class Stand:
     keys: bool = False
 
 
-BY_WORD = Stand("a twin and a driver by word")
-FUSION = Stand("lira fusion", profile="thesis-sim", fusion=("--policy", "camera-expert"))
-LEARNER = Stand(
+TWIN = Setup("a twin and a driver by control messages")
+FUSION = Setup("lira fusion", profile="thesis-sim", fusion=("--policy", "camera-expert"))
+LEARNER = Setup(
     "lira fusion, learning",
     profile="thesis-sim",
     fusion=("--method", "lira", "--start", "experts", "--run", "{run}"),
 )
-DRIVERS = Stand("the physical robot's drivers", drivers=True)
-LINK = Stand("a process in the link", link=True)
-CLOCKS = Stand("clocks that can be set", clocks=True)
-KEYED = Stand("keys", keys=True)
+DRIVERS = Setup("the physical robot's drivers", drivers=True)
+LINK = Setup("a process in the link", link=True)
+CLOCKS = Setup("clocks that can be set", clocks=True)
+KEYED = Setup("keys", keys=True)
 
 
 def clock_library() -> Path | None:

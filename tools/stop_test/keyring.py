@@ -1,0 +1,78 @@
+"""The keys of a bus under test: whoever drives by them may run out of time, or be revoked."""
+
+import subprocess
+import time
+from datetime import UTC, datetime, timedelta
+from pathlib import Path
+
+from cryptography import x509
+from cryptography.hazmat.primitives import hashes
+from cryptography.hazmat.primitives.asymmetric import ec
+from cryptography.hazmat.primitives.serialization import Encoding, load_pem_private_key
+
+from hal.keys import CERTIFICATE, KEY
+from tools.authority import AUTHORITY
+from tools.processes import lira_command
+from tools.stop_test.acts import StopTestError
+from tools.stop_test.setups import BRIEF, GUEST, LEAVER
+
+BRIEF_S, PATIENCE_S = 10.0, 20.0
+
+
+class Keyring:
+    """Bundles for a robot and some peers: a guest may only look, who is brief does not stay, a leaver is shut out.
+
+    Raises `StopTestError` if `lira keys` does not do what it should.
+    """
+
+    def __init__(self, folder: Path) -> None:
+        self.folder = folder
+        self._expires = datetime.now(UTC)
+        lira_keys("init", str(folder))
+        lira_keys("enroll", GUEST, str(folder), "--viewer")
+        for name in (BRIEF, LEAVER):
+            lira_keys("enroll", name, str(folder))
+
+    def prepare(self, name: str) -> Path:
+        """Return a bundle that is ready to be used; one that is brief, for a while."""
+        if name == BRIEF:
+            self._expires = shorten(self.folder, name, BRIEF_S)
+        return self.folder / name
+
+    def wait_expired(self) -> None:
+        """Wait until the certificate that is brief runs out."""
+        time.sleep(max((self._expires - datetime.now(UTC)).total_seconds(), 0.0))
+
+    def revoke(self, name: str) -> None:
+        """Shut a name out."""
+        lira_keys("revoke", name, str(self.folder))
+
+
+def lira_keys(*words: str) -> None:
+    """Run `lira keys`. Raises `StopTestError` if it does not do it."""
+    done = subprocess.run(lira_command("keys", *words), capture_output=True, text=True, timeout=PATIENCE_S, check=False)
+    if done.returncode != 0:
+        raise StopTestError(f"lira keys {words[0]} ended with status {done.returncode}", f"It wrote: {done.stderr}")
+
+
+def shorten(folder: Path, name: str, lifetime_s: float) -> datetime:
+    """Sign one peer's certificate anew so that it runs out in so many seconds; returns when."""
+    old = x509.load_pem_x509_certificate((folder / name / CERTIFICATE).read_bytes())
+    own = folder / AUTHORITY / name  # a peer may have an authority of its own
+    signer = load_pem_private_key(((own if own.exists() else own.parent) / KEY).read_bytes(), None)
+    assert isinstance(signer, ec.EllipticCurvePrivateKey)
+    until = (datetime.now(UTC) + timedelta(seconds=lifetime_s)).replace(microsecond=0)
+    builder = (
+        x509.CertificateBuilder()
+        .subject_name(old.subject)
+        .issuer_name(old.issuer)
+        .public_key(old.public_key())
+        .serial_number(x509.random_serial_number())
+        .not_valid_before(old.not_valid_before_utc)
+        .not_valid_after(until)
+    )
+    for extension in old.extensions:
+        builder = builder.add_extension(extension.value, extension.critical)
+    certificate = builder.sign(signer, hashes.SHA256())
+    (folder / name / CERTIFICATE).write_bytes(certificate.public_bytes(Encoding.PEM))
+    return until
