@@ -10,6 +10,7 @@ from concurrent.futures import Future, ThreadPoolExecutor
 from fusion.control import ControlLoop
 from fusion.journal import Journal
 from fusion.method import Chooser, Method
+from hal.boundary import Boundary
 from hal.bus import Bus
 from hal.errors import LiraError
 from hal.messages import OperatorAnswer, OperatorRequest, Request
@@ -62,6 +63,7 @@ class RequestDesk:
         self.paused = False
         self.episode = 0
         self._line = line
+        self._boundary = Boundary()
         self._loop = loop
         self._method = method
         self._journal = journal
@@ -76,12 +78,13 @@ class RequestDesk:
     def serve(self) -> None:
         """Answer what was asked since the last time, and what has been saved by now."""
         for asked, in_time in self._line.poll():
-            if not in_time:
-                self._answer(False, f"{asked.request} came too late: ask again")
-            elif asked.request is Request.SAVE:
-                self._begin_to_save()
-            else:
-                self._answer(*self._do(asked))
+            with self._boundary.guard(OPERATOR.key):
+                if not in_time:
+                    self._answer(False, f"{asked.request} came too late: ask again")
+                elif asked.request is Request.SAVE:
+                    self._begin_to_save()
+                else:
+                    self._answer(*self._do(asked))
         if self._saving is not None and self._saving.done():
             self._end_saving(self._saving)
         self._show()

@@ -3,9 +3,13 @@
 import struct
 from dataclasses import dataclass
 
+from hal.errors import CodecError
+
 MAGIC = b"LIR1"
 _LAYOUT = struct.Struct("<4sQQqqB")
 _RELEASED = 1
+_COUNTS = range(2**63)  # what a message's int64 holds
+_TIMES = range(-(2**62), 2**62)  # in nanoseconds: some that lie apart can still be told from one another
 
 
 @dataclass(frozen=True, slots=True)
@@ -35,8 +39,13 @@ class Attachment:
 
 
 def parse_attachment(data: bytes | None) -> Attachment | None:
-    """Unpack an attachment; None for no attachment or one that is not ours (ROS peers attach their own)."""
+    """Unpack an attachment; None for no attachment or one that is not ours (ROS peers attach their own).
+
+    Raises `CodecError` for one of ours with a number that is out of bounds.
+    """
     if data is None or len(data) != _LAYOUT.size or not data.startswith(MAGIC):
         return None
     _, epoch, seq, time_ns, answers, flags = _LAYOUT.unpack(data)
+    if seq not in _COUNTS or time_ns not in _TIMES or not (answers == -1 or answers in _COUNTS):
+        raise CodecError(f"an attachment of seq {seq}, {time_ns} ns, answers {answers} is out of bounds")
     return Attachment(epoch, seq, time_ns, answers, bool(flags & _RELEASED))

@@ -3,11 +3,12 @@
 Every message carries an attachment. Nothing here calls back: readers are polled, so no topic can stall another.
 """
 
+import itertools
 import re
 import secrets
 import time
 from collections import Counter
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from typing import Any, Generic, TypeVar
 
@@ -16,13 +17,14 @@ from zenoh import ext
 from zenoh.handlers import FifoChannel, RingChannel
 
 from hal.attachment import Attachment, parse_attachment
+from hal.boundary import Boundary
 from hal.codec import decode, encode
 from hal.connection import Connection, Declared
 from hal.errors import BusError, CodecError, ConfigError
 from hal.keys import Keys, keys_from_environment, load_keys
 from hal.refusals import Refusals
 from hal.session import open_session
-from hal.topics import COMMANDS, Qos, Topic, named
+from hal.topics import ATTACHMENT_BYTES, COMMANDS, QUESTION_BYTES, Qos, Topic, named
 
 M = TypeVar("M")
 
@@ -30,6 +32,8 @@ DEFAULT_ROBOT = "rosbot"
 DEFAULT_ENDPOINT = "127.0.0.1:7447"
 LINKS_PER_PEER = 2
 QUERY_PAUSE_S = 0.1
+QUESTIONS = 256  # that wait at most; each round answers no more
+SHOWN_REASON = 300  # characters of why a question was refused
 NONCE_BITS = 62
 POLL_S = 0.0005
 FIRST_S = 0.5  # how long to wait for a robot that is not there yet
@@ -64,7 +68,13 @@ class Publisher(Generic[M]):
     """Publishes one topic."""
 
     def __init__(
-        self, connection: Connection, declare: Callable[[zenoh.Session], Any], epoch: int, *, latched: bool
+        self,
+        connection: Connection,
+        declare: Callable[[zenoh.Session], Any],
+        epoch: int,
+        count: Iterator[int],
+        *,
+        latched: bool,
     ) -> None:
         self._connection = connection
         self._declare = declare
@@ -72,7 +82,7 @@ class Publisher(Generic[M]):
         self._kept: tuple[bytes, bytes] | None = None
         self._publisher = connection.declare(self._anew)
         self._epoch = epoch
-        self._seq = 0
+        self._count = count
 
     @property
     def matching(self) -> bool:
@@ -82,13 +92,13 @@ class Publisher(Generic[M]):
     def put(
         self, message: M, time_s: float, *, seq: int | None = None, answers: int = -1, released: bool = False
     ) -> None:
-        """Send a message at `time_s` on the robot's clock; `seq` is its own count unless given.
+        """Send a message at `time_s` on the robot's clock; `seq` is the bus's count on this key unless given.
 
         Raises `BusError` when the session is closed, `CodecError` for what ROS cannot hold.
         """
-        self._seq = self._seq + 1 if seq is None else seq
         payload = encode(message)
-        attachment = Attachment(self._epoch, self._seq, round(time_s * 1e9), answers, released).to_bytes()
+        number = next(self._count) if seq is None else seq
+        attachment = Attachment(self._epoch, number, round(time_s * 1e9), answers, released).to_bytes()
         if self._latched:
             self._kept = payload, attachment
         try:
@@ -108,30 +118,46 @@ class Publisher(Generic[M]):
 
 
 class Reader(Generic[M]):
-    """Keeps the newest of a topic. What cannot be decoded is dropped and counted in `dropped`, by reason."""
+    """Keeps the newest of a topic. What is too long or cannot be decoded is refused at the bus's `boundary`."""
 
-    def __init__(self, connection: Connection, subscriber: Declared[Any], kind: type[M]) -> None:
+    def __init__(
+        self, connection: Connection, subscriber: Declared[Any], topic: Topic[M], depth: int, boundary: Boundary
+    ) -> None:
         self._connection = connection
         self._subscriber = subscriber
-        self._kind = kind
+        self._topic = topic
+        self._boundary = boundary
         self._newest: Received[M] | None = None
-        self.dropped: Counter[str] = Counter()
+        self._depth = depth
+        self.full = False  # the last poll took all that is kept, so older messages may have been lost
 
     def poll(self) -> list[Received[M]]:
-        """Return what came since the last poll, oldest first, as far back as the reader's depth."""
+        """Return what came since the last poll, oldest first, as far back as the reader's depth.
+
+        However fast somebody sends, it takes no more than that many, so whoever polls goes on.
+        """
         found: list[Received[M]] = []
-        while (sample := self._next()) is not None:
-            try:
-                message = decode(self._kind, bytes(sample.payload))
-            except CodecError:
-                self.dropped["undecodable"] += 1
-                continue
-            attached = None if sample.attachment is None else bytes(sample.attachment)
-            key, sender = str(sample.key_expr), self._sender(sample)
-            found.append(Received(message, parse_attachment(attached), time.monotonic(), key, sender))
+        self.full = True
+        for _ in range(self._depth):
+            if (sample := self._next()) is None:
+                self.full = False
+                break
+            with self._boundary.guard(self._topic.key):
+                if (received := self._receive(sample)) is not None:
+                    found.append(received)
         if found:
             self._newest = found[-1]
         return found
+
+    def _receive(self, sample: zenoh.Sample) -> Received[M] | None:
+        """Decode a sample. What is too long is not even copied."""
+        attached = sample.attachment
+        if len(sample.payload) > self._topic.max_bytes or (attached is not None and len(attached) > ATTACHMENT_BYTES):
+            self._boundary.refuse(self._topic.key, "too long")
+            return None
+        message = decode(self._topic.kind, bytes(sample.payload))
+        sent = parse_attachment(None if attached is None else bytes(attached))
+        return Received(message, sent, time.monotonic(), str(sample.key_expr), self._sender(sample))
 
     def newest(self) -> Received[M] | None:
         """Return the newest message that ever came, however old it is."""
@@ -166,18 +192,67 @@ class Question:
         self._query = query
         self._epoch = epoch
         self.payload = b"" if query.payload is None else bytes(query.payload)
+        self.answered = False
 
     def answer(self, payload: bytes) -> None:
         """Reply, and be done with it."""
         asked = _attachment(self._query)
         nonce = 0 if asked is None else asked.seq
+        self.answered = True
         with self._query as query:
             query.reply(query.key_expr, payload, attachment=Attachment(self._epoch, nonce, 0).to_bytes())
 
     def refuse(self, why: str) -> None:
         """Reply that it cannot be done, and why."""
+        self.answered = True
         with self._query as query:
-            query.reply_err(why.encode())
+            query.reply_err(why[:SHOWN_REASON].encode())
+
+
+class Questions:
+    """The queries on a key. Of those that nobody has looked at the newest `QUESTIONS` stay, and nobody waits."""
+
+    def __init__(
+        self, connection: Connection, queryable: Declared[Any], key: str, boundary: Boundary, epoch: int
+    ) -> None:
+        self._connection = connection
+        self._epoch = epoch
+        self._queryable = queryable
+        self._key = key
+        self._boundary = boundary
+
+    def serve(
+        self, answer: Callable[[Question], None], most: int = QUESTIONS, prepare: Callable[[], None] = lambda: None
+    ) -> None:
+        """Have `answer` answer or refuse what was asked since the last time, `most` at most; `prepare` comes before.
+
+        Whatever goes wrong with one is that one's refusal. What `prepare` raises is passed on.
+        """
+        asked = self._take(most)
+        if asked:
+            prepare()
+        for question in asked:
+            with self._boundary.guard(self._key):
+                try:
+                    answer(question)
+                finally:
+                    if not question.answered:
+                        question.refuse("it could not be done")
+
+    def _take(self, most: int) -> list[Question]:
+        asked: list[Question] = []
+        for _ in range(most):
+            if (query := self._next()) is None:
+                break
+            if query.payload is not None and len(query.payload) > QUESTION_BYTES:
+                self._boundary.refuse(self._key, "too long")
+            else:
+                asked.append(Question(query, self._epoch))
+        return asked
+
+    def _next(self) -> zenoh.Query | None:
+        query: zenoh.Query | None = _take(self._connection, self._queryable)
+        return query
 
 
 class Bus:
@@ -190,9 +265,9 @@ class Bus:
 
     Peers hear the robot, not one another. With `watch` a session hears what all of them say, through the robot and
     over one link: for consoles and the like, not for driving; nobody there to connect to is a `BusError` then.
-    `refusals` is what counts those whom keys keep out, for whoever reports it. `prefix` is what keys begin with instead
-    of the name, for a robot that is not ours; it may be empty. `name` is the one that commands are sent in: that on the
-    certificate, and "" without keys.
+    `refusals` is what counts those whom keys keep out, for whoever reports it; `boundary` counts what came and was not
+    taken, and guards whoever handles messages. `prefix` is what keys begin with instead of the name, for a robot that
+    is not ours; it may be empty. `name` is what commands are sent in: that on the certificate, "" without keys.
 
     Raises `BusError` if the port is taken, `ConfigError` for a bad name, endpoint or keys.
     """
@@ -216,6 +291,8 @@ class Bus:
         self.endpoint = listen or connect or ""
         self.epoch = secrets.randbits(64)
         self.refusals = refusals or Refusals()
+        self.boundary = Boundary()
+        self._counts: dict[str, Iterator[int]] = {}  # what was sent, by key: they grow whoever sends
         keys = keys or keys_from_environment()
         self.encrypted = keys is not None
         self.name = keys.name if keys is not None and connect and prefix is None else ""
@@ -228,8 +305,10 @@ class Bus:
             )
         self._keys = keys
         self._connection = Connection(
-            lambda: open_session(robot, None, None, None),
-            None if connect is None else lambda: open_session(robot, None, connect, keys, watch=watch),
+            lambda: open_session(robot, None, None, None, prefix=self._prefix),
+            None
+            if connect is None
+            else lambda: open_session(robot, None, connect, keys, prefix=self._prefix, watch=watch),
             None if listen is None else lambda: open_session(robot, listen, None, self._read_keys()),
             None if keys is None else self._keys_changed,
         )
@@ -255,7 +334,8 @@ class Bus:
             cache = ext.CacheConfig(max_samples=1)
             return ext.declare_advanced_publisher(session, key, cache=cache, publisher_detection=True, **options)
 
-        return Publisher(self._connection, declare, self.epoch, latched=qos.latched)
+        count = self._counts.setdefault(key, itertools.count(1))
+        return Publisher(self._connection, declare, self.epoch, count, latched=qos.latched)
 
     def put_raw(self, topic: Topic[Any], payload: bytes, attachment: bytes | None = None) -> None:
         """Send bytes as they are: for relays, recorders and tests of what a bus has to bear."""
@@ -278,17 +358,16 @@ class Bus:
             history = ext.HistoryConfig(detect_late_publishers=True, max_samples=1)
             return ext.declare_advanced_subscriber(session, key, ring, history=history)
 
-        return Reader(self._connection, self._connection.declare(declare), topic.kind)
+        return Reader(self._connection, self._connection.declare(declare), topic, depth, self.boundary)
 
-    def questions(self, key: str) -> Callable[[], Question | None]:
-        """Answer queries on a key: returns a poll that gives the next question or None."""
-        queryable = self._connection.declare(lambda session: session.declare_queryable(self._key(key), FifoChannel(16)))
+    def questions(self, key: str) -> Questions:
+        """Answer queries on a key."""
 
-        def poll() -> Question | None:
-            query = _take(self._connection, queryable)
-            return None if query is None else Question(query, self.epoch)
+        # A full ring lets go of the oldest, whose sender asks again. A full FIFO would stop zenoh's own threads.
+        def declare(session: zenoh.Session) -> Any:
+            return session.declare_queryable(self._key(key), RingChannel(QUESTIONS))
 
-        return poll
+        return Questions(self._connection, self._connection.declare(declare), key, self.boundary, self.epoch)
 
     def ask(self, key: str, payload: bytes = b"", timeout_s: float = 5.0) -> bytes:
         """Query a key and return the answer; asks again while nobody is there to answer.
@@ -386,7 +465,10 @@ class Bus:
 
 
 def _attachment(carrier: zenoh.Query | zenoh.Sample) -> Attachment | None:
-    return parse_attachment(None if carrier.attachment is None else bytes(carrier.attachment))
+    try:
+        return parse_attachment(None if carrier.attachment is None else bytes(carrier.attachment))
+    except CodecError:
+        return None
 
 
 def _is_loopback(endpoint: str) -> bool:

@@ -4,34 +4,65 @@ from collections import deque
 
 # Long enough for one prompt message among late ones, short enough to follow a robot whose time runs slower.
 WINDOW_S = 0.25
+LEAP_S = 0.5  # a clock that runs as ours or slower never leaps; a link that was slow from the first on gains no more
+# So long a robot is silent before another of its name is listened to: one that was started anew, and nobody who speaks
+# between its words. Both take longer to come up.
+SILENT_S = 0.3
+HEAL_S = 1.0  # if nothing else is heard for so long, it was no mistake: the robot's clock was set
 
 
 class ClockEstimate:
     """Pure: every time comes in as an argument, `local_s` on this machine's monotonic clock.
 
     The most prompt message of the last moments sets the offset, so the estimate is late by the shortest delay and a
-    command stamped with it never looks younger than it is. It never runs back.
+    command stamped with it never looks younger than it is. It never runs back, so a time that leaps ahead of all before
+    is not taken at once: one such message would hold the estimate for ever.
     """
 
     def __init__(self) -> None:
         self._offsets: deque[tuple[float, float]] = deque()
         self._latest_s = float("-inf")
+        self._highest_s = float("inf")  # offset ever since the start
+        self._believed_s = float("-inf")
+        self._epoch: int | None = None  # of the robot that is listened to
+        self._heard_s = float("-inf")
 
     @property
     def known(self) -> bool:
         """Whether the robot was ever heard."""
         return bool(self._offsets)
 
+    def hear(self, epoch: int, sent_s: float, local_s: float) -> bool:
+        """As `note`, for a message that names its sender's session. False if it is not of the robot listened to.
+
+        A robot that was started anew has another session, and another clock.
+        """
+        if epoch != self._epoch:
+            if local_s - self._heard_s < SILENT_S:
+                return False
+            self._epoch = epoch
+            self.restart()
+        self._heard_s = local_s
+        self.note(sent_s, local_s)
+        return True
+
     def note(self, sent_s: float, local_s: float) -> None:
         """A message that the robot sent at `sent_s` came at `local_s`."""
-        self._offsets.append((local_s, sent_s - local_s))
+        offset_s = sent_s - local_s
+        if offset_s > self._highest_s + LEAP_S:
+            if local_s - self._believed_s < HEAL_S:
+                return
+            self.restart()
+        self._believed_s = local_s
+        self._highest_s = offset_s if self._highest_s == float("inf") else max(self._highest_s, offset_s)
+        self._offsets.append((local_s, offset_s))
         while self._offsets[0][0] < local_s - WINDOW_S:
             self._offsets.popleft()
 
     def restart(self) -> None:
         """Forget all: the robot was started anew and its clock with it."""
         self._offsets.clear()
-        self._latest_s = float("-inf")
+        self._latest_s, self._highest_s = float("-inf"), float("inf")
 
     def now(self, local_s: float) -> float:
         """Seconds on the robot's clock at `local_s`; only when `known`."""

@@ -1,17 +1,20 @@
 """The codec: messages of `hal.messages` as ROS 2 CDR, and back.
 
-Whatever the bytes, `decode` returns a message or raises `CodecError`.
+Whatever the bytes, `decode` returns a message within the bounds of its type (`bounds.py`) or raises `CodecError`.
 """
 
 import struct
-from typing import TypeVar
+from typing import Any, TypeVar
 
+import msgspec
 from rosbags.serde import SerdeError
 
+from hal.bounds import check
 from hal.errors import CodecError
 from hal.ros import CODECS, TYPES
 
 M = TypeVar("M")
+PADDED_BYTES = 16
 
 # rosbags raises its own error for what it checks and these for what it does not; a value that no enum or array
 # shape takes ends in the same family.
@@ -33,6 +36,11 @@ def ros_type_of(kind: type) -> str:
     return CODECS[kind].ros_type
 
 
+def fixed_bytes(example: object) -> int:
+    """The longest payload of a type that has no texts or sequences, with what DDS may pad it with."""
+    return -(-len(encode(example)) // PADDED_BYTES) * PADDED_BYTES
+
+
 def encode(message: object) -> bytes:
     """Serialise a message of `hal.messages`. Raises `CodecError` for what ROS cannot hold, such as a stamp of nan."""
     codec = CODECS[type(message)]
@@ -47,6 +55,15 @@ def decode(kind: type[M], data: bytes) -> M:
     codec = CODECS[kind]
     try:
         message: M = codec.from_ros(TYPES.deserialize_cdr(data, codec.ros_type))
+        check(message)
     except _MALFORMED as error:
         raise CodecError(f"{len(data)} bytes are no {codec.ros_type}: {error}") from error
     return message
+
+
+def decode_json(kind: Any, data: bytes) -> Any:
+    """Read a value of `kind`, with the bounds in its type, from JSON. Raises `CodecError`, and nothing else."""
+    try:
+        return msgspec.json.decode(data, type=kind)
+    except (msgspec.MsgspecError, ValueError, RecursionError) as error:
+        raise CodecError(f"{len(data)} bytes are not what was expected: {error}") from error

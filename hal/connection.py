@@ -117,7 +117,10 @@ class Connection:
                 self._closed.wait(RETRY_S)
                 continue
             events = session.info.declare_link_events_listener(RingChannel(EVENTS))
-            self._replace(session)
+            if not self._replace(session):
+                self._replace(self._idle())
+                self._closed.wait(RETRY_S)
+                continue
             self._up.set()
             while not self._closed.wait(LOOK_S):
                 if _lost_a_link(events) and not self.closed:
@@ -129,36 +132,52 @@ class Connection:
         while not self._closed.wait(STALE_S):
             if not self.trouble and not stale():
                 continue
-            if not self.trouble:
-                self._let_all_go()
+            self._let_all_go()
             try:
                 session = listen()
             except LiraError as error:
                 self.trouble = str(error)
             else:
-                self._replace(session)
-                self.trouble = ""
+                self.trouble = "" if self._replace(session) else "the bus could not be set up anew"
 
     def _let_all_go(self) -> None:
         """End all links, so that the address is free. Whatever it takes: some of them may be there no longer."""
         try:
-            closing = self._replace(self._idle())
+            self._replace(self._idle())
         except BusError:  # a crowd holds all descriptors
             _let_go(self.session)
-        else:
-            if closing is not None:
-                closing.join(CLOSING_S)
+        for thread in self._threads:
+            if thread is not threading.current_thread():
+                thread.join(CLOSING_S)
 
-    def _replace(self, session: zenoh.Session) -> threading.Thread | None:
-        """Declare everything on another session; returns what closes the old one, None if all is closed already."""
+    def _replace(self, session: zenoh.Session) -> bool:
+        """Go on with another session; returns whether all that was declared is declared on it.
+
+        To declare can take as long as a link that hangs, so nobody who declares or closes has to wait for it.
+        """
         with self._lock:
-            if not self._closed.is_set():
-                before, self.session = self.session, session
-                for declared in self._declared:
-                    declared.move(session)
-                return self._begin(_let_go, before)  # which may take long while links are dead
-        _let_go(session)
-        return None
+            closed = self._closed.is_set()
+            before, self.session = self.session, self.session if closed else session
+            declared = list(self._declared)
+        if closed:
+            _let_go(session)
+            return False
+        try:
+            for each in declared:
+                each.move(session)
+        except zenoh.ZError:
+            return False  # it died already, or was closed meanwhile
+        finally:
+            self._leave(before)
+        return True
+
+    def _leave(self, session: zenoh.Session) -> None:
+        """Close a session, which may take long while links are dead: beside, unless `close` waits for it here."""
+        with self._lock:
+            if beside := not self._closed.is_set():
+                self._begin(_let_go, session)
+        if not beside:
+            _let_go(session)
 
 
 def _lost_a_link(events: Any) -> bool:

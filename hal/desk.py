@@ -1,25 +1,33 @@
 """The HAL server's front desk: who am I talking to, and, for a twin, start afresh."""
 
 from collections.abc import Callable
+from typing import Annotated, Literal
 
 import msgspec
 
-from hal.bus import Bus
-from hal.errors import BusError, LiraError
+from hal.bounds import LARGEST
+from hal.bus import Bus, Question
+from hal.codec import decode_json
+from hal.errors import BusError, CodecError, LiraError
 from hal.messages import Episode
 from hal.port import Arena
 from hal.profile import RobotProfile
 from hal.topics import INFO, RESET
 
-REALTIME, LOCKSTEP = "realtime", "lockstep"
+REALTIME: Literal["realtime"] = "realtime"
+LOCKSTEP: Literal["lockstep"] = "lockstep"
+RESETS = 1  # at a time
+
+Token = Annotated[int, msgspec.Meta(ge=0)]  # msgspec keeps integers within 64 bits
+Moment = Annotated[float, msgspec.Meta(ge=-LARGEST, le=LARGEST)]
 
 
 class Info(msgspec.Struct, frozen=True):
     """What a robot says about itself. `arena` is whatever its twin says about its world, null for a real floor."""
 
     profile: RobotProfile
-    mode: str
-    epoch: int
+    mode: Literal["realtime", "lockstep"]
+    epoch: Token
     arena: msgspec.Raw = msgspec.Raw(b"null")
 
     def to_json(self) -> bytes:
@@ -30,17 +38,19 @@ class Info(msgspec.Struct, frozen=True):
 def info_from_json(data: bytes) -> Info:
     """Decode what `Info.to_json` wrote. Raises `BusError`."""
     try:
-        return msgspec.json.decode(data, type=Info)
-    except (msgspec.MsgspecError, ValueError) as error:
+        info: Info = decode_json(Info, data)
+    except CodecError as error:
         raise BusError(f"the robot says what is not understood: {error}", "Run one version on both sides.") from error
+    return info
 
 
 def reset_time(answer: bytes) -> float:
     """Return when a reset happened, from the robot's answer to it. Raises `BusError`."""
     try:
-        return msgspec.json.decode(answer, type=float)
-    except msgspec.MsgspecError as error:
+        moment_s: float = decode_json(Moment, answer)
+    except CodecError as error:
         raise BusError(f"the robot says what is not understood: {error}", "Run one version on both sides.") from error
+    return moment_s
 
 
 class Desk:
@@ -57,14 +67,13 @@ class Desk:
         self._reset_asked = None if arena is None else bus.questions(RESET)
 
     def serve(self, show: Callable[[], None]) -> None:
-        """Answer what was asked since the last time, and call `show` before each answer.
+        """Answer what was asked since the last time, and call `show` before the answers.
 
-        `show` publishes the robot's newest observation, so that whoever asks has it when the answer comes.
+        `show` publishes the robot's newest observation, so that whoever asks has it when the answer comes. Many who
+        ask cost the robot one, and one new start at a time.
         """
-        while (question := self._info_asked()) is not None:
-            show()
-            question.answer(self._info)
-        while self._reset_asked is not None and (question := self._reset_asked()) is not None:
+
+        def answer_reset(question: Question) -> None:
             reset_s = self._now()
             if why := self._reset(question.payload):
                 question.refuse(why)
@@ -72,12 +81,16 @@ class Desk:
                 show()
                 question.answer(msgspec.json.encode(reset_s))
 
+        self._info_asked.serve(lambda question: question.answer(self._info), prepare=show)
+        if self._reset_asked is not None:
+            self._reset_asked.serve(answer_reset, most=RESETS)
+
     def _reset(self, payload: bytes) -> str | None:
         """Start the episode; returns why not."""
         assert self._arena is not None
         try:
-            self._arena.reset(msgspec.json.decode(payload, type=Episode))
-        except (msgspec.MsgspecError, ValueError) as error:
+            self._arena.reset(decode_json(Episode, payload))
+        except CodecError as error:
             return f"not an episode: {error}"
         except LiraError as error:
             return str(error)

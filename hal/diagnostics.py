@@ -7,7 +7,6 @@ import time
 from hal.bus import Bus
 from hal.governed import GovernedRobot
 from hal.governor import State
-from hal.inlet import Inlet
 from hal.messages import DiagnosticArray, DiagnosticStatus
 from hal.refusals import FULL, LINK
 from hal.topics import DIAGNOSTICS
@@ -38,10 +37,9 @@ class LinkWatch:
 class Reporter:
     """Publishes the diagnostics, and prints what is new and wrong to standard error."""
 
-    def __init__(self, robot: GovernedRobot, bus: Bus, inlet: Inlet) -> None:
+    def __init__(self, robot: GovernedRobot, bus: Bus) -> None:
         self._robot = robot
         self._bus = bus
-        self._inlet = inlet
         self._watch = LinkWatch()
         self._publisher = bus.publisher(DIAGNOSTICS)
         self._said = ""
@@ -74,7 +72,8 @@ class Reporter:
 
     def _governor(self) -> DiagnosticStatus:
         state = self._robot.state
-        counts = self._robot.refused | {"undecodable": self._inlet.dropped, "no sender": self._inlet.nameless}
+        at_the_door = {f"{key}: {reason}": count for (key, reason), count in self._bus.boundary.counts.items()}
+        counts = self._robot.refused | at_the_door
         values = tuple((f"refused: {reason}", str(count)) for reason, count in sorted(counts.items()))
         level = WARN if state in (State.STOPPED, State.EMERGENCY) else OK
         return DiagnosticStatus(level, f"{self._bus.robot}: governor", state.value, values)

@@ -1,77 +1,103 @@
 """What a HAL server takes in: commands, as they came."""
 
-from collections import deque
+from collections import OrderedDict
 
+from hal.attachment import Attachment
 from hal.bus import Bus, Reader, Received
 from hal.governor import is_neutral
 from hal.messages import Command, Source, Twist
 from hal.topics import CMD_VEL, ESTOP, TELEOP, Topic, commander_of, named
 
-SEEN = 256
 EPOCHS = 1 << 64
 DEPTH = 32  # a neutral command must not be lost under the motion that follows it
+ESTOP_DEPTH = 256
+SESSIONS = 256  # whose count is remembered
+BURST = 4  # a peer without attachments that says so much within one poll did not say it just now
+
+
+class Order:
+    """Tells what was sent before something else of the same session, or for the second time. Pure."""
+
+    def __init__(self) -> None:
+        self._highest: OrderedDict[tuple[str, int], int] = OrderedDict()
+
+    def is_new(self, sent: Attachment, commander: str = "") -> bool:
+        """Whether nothing that was sent later in its session came before it; remembers it."""
+        session = commander, sent.epoch
+        highest = self._highest.pop(session, -1)
+        self._highest[session] = max(highest, sent.seq)
+        if len(self._highest) > SESSIONS:
+            self._highest.popitem(last=False)
+        return sent.seq > highest
 
 
 class Inlet:
     """Reads the command topics."""
 
     def __init__(self, bus: Bus) -> None:
-        self._policy = _readers(bus, CMD_VEL)
-        self._teleop = _readers(bus, TELEOP)
-        self._estop = bus.reader(ESTOP, DEPTH)
-        self._seen: deque[tuple[int, int]] = deque(maxlen=SEEN)
-        self.nameless = 0  # commands that came with nothing to tell whose they are
+        self._policy = _Commands(bus, CMD_VEL, Source.POLICY)
+        self._teleop = _Commands(bus, TELEOP, Source.TELEOP)
+        self._estop = bus.reader(ESTOP, ESTOP_DEPTH)
+        self._seen = Order()
 
     def policy(self, now_s: float) -> list[Command]:
         """Return policy's commands since the last time, oldest first."""
-        return self._commands(self._policy, Source.POLICY, now_s)
+        return self._policy.take(now_s)
 
     def teleop(self, now_s: float) -> list[Command]:
         """Return teleop's commands since the last time, oldest first."""
-        return self._commands(self._teleop, Source.TELEOP, now_s)
+        return self._teleop.take(now_s)
 
     def estop(self) -> bool:
         """Whether anybody pressed the emergency stop since the last time.
 
-        The bus shows a latched message again to whoever reconnects: what was seen once does not press twice.
+        The bus shows a latched message again to whoever reconnects: what was seen once does not press twice. So many
+        messages at once that one may have been lost count as a press: it may have been that one.
         """
-        pressed = False
-        for received in self._estop.poll():
-            sent = received.attachment
-            known = sent is not None and (sent.epoch, sent.seq) in self._seen
-            if sent is not None and not known:
-                self._seen.append((sent.epoch, sent.seq))
-            pressed |= received.message.data and not known
-        return pressed
-
-    @property
-    def dropped(self) -> int:
-        """How many payloads were no commands."""
-        commands = sum(sum(reader.dropped.values()) for reader in (*self._policy, *self._teleop))
-        return commands + sum(self._estop.dropped.values())
-
-    def _commands(self, readers: list[Reader[Twist]], source: Source, now_s: float) -> list[Command]:
-        commands = []
-        for received in (received for reader in readers for received in reader.poll()):
-            if received.attachment is None and not received.sender:
-                self.nameless += 1
-            else:
-                commands.append(_command(received, source, now_s))
-        return commands
+        came = self._estop.poll()
+        new = [received for received in came if received.attachment is None or self._seen.is_new(received.attachment)]
+        return self._estop.full or any(received.message.data for received in new)
 
 
-def _readers(bus: Bus, topic: Topic[Twist]) -> list[Reader[Twist]]:
-    """Of the plain topic, where names do not matter or are not known (ROS bridges'), and of those with a name."""
-    return [bus.reader(topic, DEPTH), *([bus.reader(named(topic, "*"), DEPTH)] if bus.encrypted else [])]
+class _Commands:
+    """One of the command topics."""
 
+    def __init__(self, bus: Bus, topic: Topic[Twist], source: Source) -> None:
+        # Of the plain topic, where names do not matter or are not known (ROS bridges'), and of those with a name.
+        topics = [topic, named(topic, "*")] if bus.encrypted else [topic]
+        self._readers: list[Reader[Twist]] = [bus.reader(each, DEPTH) for each in topics]
+        self._boundary = bus.boundary
+        self._key = topic.key
+        self._source = source
+        self._order = Order()
 
-def _command(received: Received[Twist], source: Source, now_s: float) -> Command:
-    """Its time is the sender's. A sample without our attachment (a ROS peer's) is judged by its arrival, and its hand
-    lets go with a zero: it cannot say so in another way. Such peers are told apart by the id of their session.
-    """
-    twist, sent, commander = received.message, received.attachment, commander_of(received.key)
-    if sent is None:
-        let_go = source is Source.TELEOP and is_neutral(twist)
-        epoch = int(received.sender, 16) % EPOCHS
-        return Command(twist, now_s, source, released=let_go, epoch=epoch, commander=commander)
-    return Command(twist, sent.time_s, source, sent.answers, sent.released, sent.epoch, sent.seq, commander)
+    def take(self, now_s: float) -> list[Command]:
+        """Return what came since the last time, oldest first."""
+        came = [received for reader in self._readers for received in reader.poll()]
+        bare = sum(received.attachment is None for received in came)
+        if bare >= BURST:
+            # These are judged by when they come, and what a link has held back for seconds comes all at once.
+            self._boundary.refuse(self._key, "burst", bare)
+            came = [received for received in came if received.attachment is not None]
+        return [self._command(received, now_s) for received in came if self._is_new(received)]
+
+    def _is_new(self, received: Received[Twist]) -> bool:
+        sent = received.attachment
+        if sent is None:
+            why = "" if received.sender else "no sender"
+        else:
+            why = "" if self._order.is_new(sent, commander_of(received.key)) else "out of order"
+        if why:
+            self._boundary.refuse(self._key, why)
+        return not why
+
+    def _command(self, received: Received[Twist], now_s: float) -> Command:
+        """Its time is the sender's. A sample without our attachment (a ROS peer's) is judged by its arrival, and its
+        hand lets go with a zero: it cannot say so in another way. Such peers are told apart by the id of their session.
+        """
+        twist, sent, commander = received.message, received.attachment, commander_of(received.key)
+        if sent is None:
+            released = self._source is Source.TELEOP and is_neutral(twist)
+            epoch = int(received.sender, 16) % EPOCHS
+            return Command(twist, now_s, self._source, released=released, epoch=epoch, commander=commander)
+        return Command(twist, sent.time_s, self._source, sent.answers, sent.released, sent.epoch, sent.seq, commander)

@@ -6,9 +6,10 @@ Frames and units: REP-103 (SI units, x forward, y left, yaw counter-clockwise) a
 
 from dataclasses import dataclass, field
 from enum import StrEnum
-from typing import ClassVar
+from typing import Annotated, ClassVar
 
 import numpy as np
+from msgspec import Meta
 from numpy.typing import NDArray
 
 FloatArray = NDArray[np.float32]
@@ -308,20 +309,26 @@ class CourseState:
     finished: bool = False
 
 
+# What a place in a twin's world is asked for with; beyond, nobody could have meant it.
+Seed = Annotated[int, Meta(ge=0, lt=2**32)]
+Along = Annotated[float, Meta(ge=-1e6, le=1e6)]
+Aside = Annotated[float, Meta(ge=-1e3, le=1e3)]
+
+
 @dataclass(frozen=True, slots=True)
 class Episode:
-    """A fresh start in a twin's world.
+    """A fresh start in a twin's world. Its bounds hold for one that is asked for over the bus.
 
     `layout` seeds everything random in the world; `start_m` is where on the course the robot is put down
     (0: the world's own start), `lateral_m` and `yaw_rad` how far off it, relative to the course. `began_m` is where the
     lap began that this goes on with, after a crash; None if it begins here.
     """
 
-    layout: int = 0
-    start_m: float = 0.0
-    lateral_m: float = 0.0
-    yaw_rad: float = 0.0
-    began_m: float | None = None
+    layout: Seed = 0
+    start_m: Along = 0.0
+    lateral_m: Aside = 0.0
+    yaw_rad: Aside = 0.0
+    began_m: Along | None = None
 
 
 Action = tuple[float, float]

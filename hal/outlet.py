@@ -52,7 +52,8 @@ class Outlet:
             if self._only_new and self._sent_s.get(topic.key) == message.stamp_s:
                 continue
             self._sent_s[topic.key] = message.stamp_s
-            self._publishers[topic.key].put(message, now_s, seq=observation.seq)
+            with self._bus.boundary.guard(topic.key):
+                self._publishers[topic.key].put(message, now_s, seq=observation.seq)
 
     def put_image(self, observation: Observation, now_s: float) -> None:
         """Publish the image, compressed as the profile says. Raises `SensorError` if that fails."""

@@ -1,15 +1,60 @@
-"""Pictures off the bus are looked over before a decoder gets them."""
+"""Pictures off the bus are looked over before a decoder gets them: few bytes can ask it for seconds and gigabytes."""
 
 PNG_START = b"\x89PNG\r\n\x1a\n"
+JPEG_START = b"\xff\xd8"
 CHUNK_FRAME = 12  # length, type and checksum around what a chunk holds
+LARGEST_BYTES = 8 * 2**20  # of pixels, decoded: 1920 x 1080 in colour
+MOST_SCANS = 64  # of a progressive JPEG; each goes over all pixels once more
+
+_PNG_CHANNELS = {0: 1, 2: 3, 3: 3, 4: 2, 6: 4}  # by colour type; an index stands for a colour
+_JPEG_FRAMES = frozenset({*range(0xC0, 0xD0)} - {0xC4, 0xC8, 0xCC})  # markers of a frame header (ITU T.81, table B.1)
+_JPEG_BARE = frozenset({0x01, *range(0xD0, 0xD9)})  # markers without a length
+_JPEG_SCAN, _JPEG_END = 0xDA, 0xD9
 
 
-def is_sound(data: bytes) -> bool:
-    """Whether no part of a PNG claims to be longer than what there is; other formats cannot claim much.
+def objection(data: bytes) -> str:
+    """Say why a picture is not to be decoded, "" if it may be. Whether it is whole, only the decoder can tell."""
+    if data.startswith(PNG_START):
+        return _png_objection(data)
+    if data.startswith(JPEG_START):
+        return _jpeg_objection(data)
+    return "neither a JPEG nor a PNG"
 
-    OpenCV sets aside what a part claims, up to 4 GB, before it finds out, which takes it most of a minute.
-    """
+
+def _png_objection(data: bytes) -> str:
+    """OpenCV sets aside what a part claims, up to 4 GB, before it finds out, which takes it most of a minute."""
     at = len(PNG_START)
-    while data.startswith(PNG_START) and at < len(data):
+    while at < len(data):
         at += CHUNK_FRAME + int.from_bytes(data[at : at + 4])
-    return not data.startswith(PNG_START) or at == len(data)
+    if at != len(data):
+        return "a part of the picture is longer than the picture"
+    head = data[16:26]  # width, height, bits and colour type, in the first chunk
+    if len(head) < 10 or data[12:16] != b"IHDR" or head[9] not in _PNG_CHANNELS:
+        return "no header"
+    width, height = int.from_bytes(head[:4]), int.from_bytes(head[4:8])
+    return _size_objection(width, height, _PNG_CHANNELS[head[9]] * max(head[8], 8) // 8)
+
+
+def _jpeg_objection(data: bytes) -> str:
+    """The decoder skips what is no marker, so this does, too."""
+    at = len(JPEG_START)
+    while (at := data.find(b"\xff", at)) >= 0 and at + 1 < len(data):
+        marker = data[at + 1]
+        if marker in _JPEG_FRAMES and at + 10 <= len(data):
+            height, width = int.from_bytes(data[at + 5 : at + 7]), int.from_bytes(data[at + 7 : at + 9])
+            if why := _size_objection(width, height, max(data[at + 9], 3)):
+                return why
+        if marker == _JPEG_SCAN:
+            return "too many scans" if data.count(b"\xff\xda", at) > MOST_SCANS else ""
+        if marker == _JPEG_END:
+            return ""
+        if marker in (0x00, 0xFF) or marker in _JPEG_BARE:
+            at += 1 if marker == 0xFF else 2
+        else:
+            at += 2 + max(int.from_bytes(data[at + 2 : at + 4]), 2)
+    return ""
+
+
+def _size_objection(width: int, height: int, bytes_each: int) -> str:
+    large = width * height * bytes_each > LARGEST_BYTES
+    return f"{width} x {height} pixels are more than are decoded here" if large else ""

@@ -10,6 +10,7 @@ its own stamp and never repeated.
 import math
 import threading
 import time
+from collections.abc import Callable
 from dataclasses import replace
 
 from hal.bus import Bus, Publisher
@@ -47,14 +48,21 @@ class RealTimeLink:
         self._untold = False  # the robot has stopped by itself, and whoever drives here has not heard of it
         self._held: dict[Source, Command] = {}
         self._repeat_s = 0.0
-        # Over the clock, the held decisions, the order of what is sent, and what came back.
+        self._boundary = bus.boundary
+        # Over the order of what is sent, which a link may hold up; taken before the other one.
+        self._sending = threading.Lock()
+        # Over the clock, the held decisions and what came back: never held while something is sent.
         self._heard = threading.Condition()
         self._stop = threading.Event()
-        self._thread = threading.Thread(target=self._run, name="remote-robot", daemon=True)
+        self._threads = [
+            threading.Thread(target=self._run, args=[work, topic.key], name=f"remote-{name}", daemon=True)
+            for name, work, topic in (("listen", self._listen, APPLIED), ("repeat", self._repeat, CMD_VEL))
+        ]
 
     def start(self) -> None:
         """Listen until the robot's clock is known. Raises `BusError` if it says nothing."""
-        self._thread.start()
+        for thread in self._threads:
+            thread.start()
         deadline_s = time.monotonic() + HEAR_S
         while not self._clock.known:
             if time.monotonic() > deadline_s:
@@ -63,11 +71,13 @@ class RealTimeLink:
 
     def stand(self) -> None:
         """Have the robot stand until the next decision: what was decided before a reset does not drive after it."""
-        with self._heard:
-            for source, command in list(self._held.items()):
+        with self._sending:
+            with self._heard:
                 now_s = self._clock.now(time.monotonic())
-                self._held[source] = replace(command, twist=STOP, stamp_s=now_s)
-                self._send_held(now_s, self._held[source])
+                for source, command in self._held.items():
+                    self._held[source] = replace(command, twist=STOP, stamp_s=now_s)
+                due = self._due(now_s, *self._held)
+            self._send(due, now_s)
 
     def refresh(self, reset_s: float) -> None:
         """Forget what was captured before a reset, and wait a moment for what comes after it."""
@@ -102,18 +112,19 @@ class RealTimeLink:
         caller does not know (this call tells): it would arm the robot, and nobody has decided that.
         """
         decided = command.source is Source.POLICY or command.answers >= 0
+        with self._sending:
+            with self._heard:
+                now_s = self._clock.now(time.monotonic())
+                if decided and self._would_arm_blindly(now_s, command):
+                    told = self._newest if self._untold else None
+                    self._untold = False
+                    self._held.pop(command.source, None)  # what was decided before holds no more
+                    return told or Applied(STOP, now_s, reason=Reason.STALE)
+                if decided:
+                    self._held[command.source] = command
+                due = self._due(now_s, command.source) if decided else [command]
+            self._send(due, now_s if decided else command.stamp_s)
         with self._heard:
-            now_s = self._clock.now(time.monotonic())
-            if decided and self._would_arm_blindly(now_s, command):
-                told = self._newest if self._untold else None
-                self._untold = False
-                self._held.pop(command.source, None)  # what was decided before holds no more
-                return told or Applied(STOP, now_s, reason=Reason.STALE)
-            if decided:
-                self._held[command.source] = command
-                self._send_held(now_s, command)
-            else:
-                _put(self._publishers[command.source], command, command.stamp_s)
             self._heard.wait_for(lambda: _results_from(self._newest, command, now_s), ANSWER_S)
             newest = self._newest
             if newest is None or now_s - newest.stamp_s > APPLIED.max_age_s:
@@ -131,17 +142,18 @@ class RealTimeLink:
     def close(self) -> None:
         """Say stop, and fall silent."""
         self._stop.set()
-        if self._thread.is_alive():
-            self._thread.join()
+        if self._threads[0].is_alive():
+            for thread in self._threads:
+                thread.join()
             self._held.clear()
             for _ in range(FAREWELL):
                 _put(self._publishers[Source.POLICY], Command(STOP, 0.0, released=True), self.now())
 
-    def _run(self) -> None:
+    def _run(self, work: Callable[[], None], key: str) -> None:
         while not self._stop.wait(POLL_S):
             try:
-                self._listen()
-                self._repeat()
+                with self._boundary.guard(key):
+                    work()
             except BusError:
                 return  # the bus was closed first: whoever drives or reads hears of it
 
@@ -168,12 +180,13 @@ class RealTimeLink:
             self._untold = True
 
     def _repeat(self) -> None:
-        with self._heard:
-            if not self._clock.known or (now_s := self._clock.now(time.monotonic())) < self._repeat_s:
-                return
-            self._repeat_s = now_s + 1.0 / REPEAT_HZ
-            for command in list(self._held.values()):
-                self._send_held(now_s, command)
+        with self._sending:
+            with self._heard:
+                if not self._clock.known or (now_s := self._clock.now(time.monotonic())) < self._repeat_s:
+                    return
+                self._repeat_s = now_s + 1.0 / REPEAT_HZ
+                due = self._due(now_s, *self._held)
+            self._send(due, now_s)
 
     def _would_arm_blindly(self, now_s: float, command: Command) -> bool:
         """Whether this is neutral, and the robot has stopped, or may have lost patience since it was last heard."""
@@ -183,12 +196,19 @@ class RealTimeLink:
         age_s = 0.0 if math.isnan(newest.command_age_s) else newest.command_age_s
         return self._untold or now_s - newest.stamp_s + age_s > self._patience_s
 
-    def _send_held(self, now_s: float, command: Command) -> None:
-        """Send a decision with the time of sending; let go of it when it is too old."""
-        if now_s - command.stamp_s > DECISION_S or self._would_arm_blindly(now_s, command):
-            del self._held[command.source]
-        else:
-            _put(self._publishers[command.source], command, now_s)
+    def _due(self, now_s: float, *sources: Source) -> list[Command]:
+        """The decisions that are still to be sent; lets go of what is too old."""
+        due = []
+        for command in [self._held[source] for source in sources]:
+            if now_s - command.stamp_s > DECISION_S or self._would_arm_blindly(now_s, command):
+                del self._held[command.source]
+            else:
+                due.append(command)
+        return due
+
+    def _send(self, commands: list[Command], time_s: float) -> None:
+        for command in commands:
+            _put(self._publishers[command.source], command, time_s)
 
 
 def _has_all(before: Observation, after: Observation) -> bool:

@@ -17,6 +17,7 @@ class ArenaLoop:
     def __init__(self, arena: Arena, bus: Bus, info: Info, now: Callable[[], float]) -> None:
         self._arena = arena
         self._now = now
+        self._boundary = bus.boundary
         self._desk = Desk(bus, info, arena, now)
         self._state = bus.publisher(SIM_STATE)
 
@@ -30,4 +31,5 @@ class ArenaLoop:
                 self._show()
 
     def _show(self) -> None:
-        self._state.put(self._arena.state(), self._now())
+        with self._boundary.guard(SIM_STATE.key):
+            self._state.put(self._arena.state(), self._now())

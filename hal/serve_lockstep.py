@@ -17,7 +17,7 @@ from hal.inlet import Inlet
 from hal.messages import Clock, Command, Observation
 from hal.outlet import Outlet
 from hal.port import Arena
-from hal.topics import APPLIED, CLOCK, LOCKSTEP, SIM_STATE
+from hal.topics import APPLIED, CAMERA, CLOCK, LOCKSTEP, SIM_STATE, TELEOP
 
 REPEAT_S = 1.0  # wall time after which an unanswered observation is sent again, to whoever listens by now
 POLL_S = 0.0002
@@ -32,6 +32,7 @@ class LockstepLoop:
         self._robot = robot
         self._desk = desk
         self._arena = arena
+        self._boundary = bus.boundary
         self._inlet = Inlet(bus)
         self._estop = EstopDesk(robot, bus)
         self._outlet = Outlet(bus, robot.profile.camera, lockstep=True)
@@ -48,7 +49,8 @@ class LockstepLoop:
             if command is None:
                 return
             applied = self._robot.drive(command)
-            self._applied.put(applied, self._robot.now(), seq=command.answers, answers=command.answers)
+            with self._boundary.guard(APPLIED.key):
+                self._applied.put(applied, self._robot.now(), seq=command.answers, answers=command.answers)
             self._robot.wait(self._robot.now() + self._robot.profile.period_s)
 
     def _show(self) -> None:
@@ -56,9 +58,11 @@ class LockstepLoop:
         self._observation = observation = self._robot.read()
         now_s, seq = self._robot.now(), observation.seq
         self._outlet.put(observation, now_s)
-        self._outlet.put_image(observation, now_s)
+        with self._boundary.guard(CAMERA.key):
+            self._outlet.put_image(observation, now_s)
         if self._arena is not None:
-            self._state.put(self._arena.state(), now_s, seq=seq)
+            with self._boundary.guard(SIM_STATE.key):
+                self._state.put(self._arena.state(), now_s, seq=seq)
         self._clock.put(Clock(now_s), now_s, seq=seq)
 
     def _next_command(self, stop: threading.Event) -> Command | None:
@@ -87,7 +91,8 @@ class LockstepLoop:
             return None
         for command in self._inlet.teleop(now_s):
             if command.answers in (-1, seq):
-                self._robot.submit(_free(command))
+                with self._boundary.guard(TELEOP.key):
+                    self._robot.submit(_free(command))
         return _free(answers[-1])
 
 

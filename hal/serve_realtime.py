@@ -12,13 +12,12 @@ from collections import deque
 
 from hal.bus import Bus
 from hal.desk import Desk
-from hal.errors import SensorError
 from hal.governed import GovernedRobot
 from hal.inlet import Inlet
 from hal.messages import Applied, Observation, Reason
 from hal.outlet import Outlet
 from hal.port import Arena
-from hal.topics import APPLIED, SIM_STATE
+from hal.topics import APPLIED, CAMERA, CMD_VEL, DEPTH, SIM_STATE
 
 POLL_S = 0.002  # how long a command may lie
 WATCHDOG_S = 0.02
@@ -32,7 +31,8 @@ class CommandLoop:
 
     def __init__(self, robot: GovernedRobot, bus: Bus, herald: "AppliedLoop") -> None:
         self._robot = robot
-        self.inlet = Inlet(bus)
+        self._inlet = Inlet(bus)
+        self._boundary = bus.boundary
         self._herald = herald
 
     def run(self, stop: threading.Event) -> None:
@@ -41,12 +41,14 @@ class CommandLoop:
         told: Reason | None = None
         try:
             while not stop.wait(POLL_S):
-                now_s = time.monotonic()
-                commanded = self._obey()
-                if not commanded and now_s < watch_s:
+                # Time-outs first: nothing that others send holds them up.
+                applied = self._robot.tick() if time.monotonic() >= watch_s else None
+                if commanded := self._obey():
+                    applied = self._robot.tick()
+                if applied is None:
                     continue
+                now_s = time.monotonic()
                 watch_s = now_s + WATCHDOG_S
-                applied = self._robot.tick()
                 if commanded or applied.reason is not told or now_s >= publish_s:
                     publish_s = now_s + 1.0 / APPLIED.rate_hz
                     told = applied.reason
@@ -56,12 +58,13 @@ class CommandLoop:
 
     def _obey(self) -> bool:
         """Hand new commands to the governor, the person's first. Returns whether there were any."""
-        if self.inlet.estop():
+        if self._inlet.estop():
             self._robot.press_estop()
         now_s = self._robot.now()
-        commands = self.inlet.teleop(now_s) + self.inlet.policy(now_s)
+        commands = self._inlet.teleop(now_s) + self._inlet.policy(now_s)
         for command in commands:
-            self._robot.submit(command)
+            with self._boundary.guard(CMD_VEL.key):
+                self._robot.submit(command)
         return bool(commands)
 
 
@@ -70,6 +73,7 @@ class AppliedLoop:
 
     def __init__(self, robot: GovernedRobot, bus: Bus) -> None:
         self._robot = robot
+        self._boundary = bus.boundary
         self._publisher = bus.publisher(APPLIED)
         self._untold: deque[Applied] = deque(maxlen=UNTOLD)
         self._offered = threading.Event()
@@ -86,7 +90,8 @@ class AppliedLoop:
             self._offered.clear()
             while self._untold:
                 applied = self._untold.popleft()
-                self._publisher.put(applied, self._robot.now(), answers=applied.answers)
+                with self._boundary.guard(APPLIED.key):
+                    self._publisher.put(applied, self._robot.now(), answers=applied.answers)
 
 
 class SensorLoop:
@@ -97,6 +102,7 @@ class SensorLoop:
     ) -> None:
         self._robot = robot
         self._outlet = outlet
+        self._boundary = bus.boundary
         self._images = images
         self._desk = desk
         self._arena = arena
@@ -116,18 +122,19 @@ class SensorLoop:
         self._images.offer(observation)
         if self._arena is not None and now_s >= self._state_due_s:
             self._state_due_s = now_s + 1.0 / SIM_STATE.rate_hz
-            self._state.put(self._arena.state(), now_s, seq=observation.seq)
+            with self._boundary.guard(SIM_STATE.key):
+                self._state.put(self._arena.state(), now_s, seq=observation.seq)
 
 
 class ImageLoop:
     """Sends the newest image; one that is still waiting when the next comes is dropped."""
 
-    def __init__(self, robot: GovernedRobot, outlet: Outlet) -> None:
+    def __init__(self, robot: GovernedRobot, bus: Bus, outlet: Outlet) -> None:
         self._robot = robot
+        self._boundary = bus.boundary
         self._outlet = outlet
         self._newest: Observation | None = None
         self._offered = threading.Condition()
-        self.refused = 0  # images that could not be compressed
 
     def offer(self, observation: Observation) -> None:
         """Leave an observation to be sent."""
@@ -145,10 +152,9 @@ class ImageLoop:
                 self._send(observation)
 
     def _send(self, observation: Observation) -> None:
-        try:
-            if self._outlet.image_wanted:
+        if self._outlet.image_wanted:
+            with self._boundary.guard(CAMERA.key):
                 self._outlet.put_image(observation, self._robot.now())
-            if self._outlet.depth_wanted:
+        if self._outlet.depth_wanted:
+            with self._boundary.guard(DEPTH.key):
                 self._outlet.put_depth(observation, self._robot.now())
-        except SensorError:
-            self.refused += 1

@@ -83,7 +83,7 @@ class HalServer:
         crew = _Crew(stop)
         opened, wheels_still = threading.Event(), threading.Event()
         outlet = Outlet(self._bus, self._robot.profile.camera, lockstep=False)
-        images = ImageLoop(self._robot, outlet)
+        images = ImageLoop(self._robot, self._bus, outlet)
 
         def sense() -> None:
             # What opens the devices reads and closes them: some are bound to their thread.
@@ -105,7 +105,7 @@ class HalServer:
         crew.start("images", lambda: images.run(stop))
         estop = EstopDesk(self._robot, self._bus)
         crew.start("estop", lambda: estop.run(stop))
-        reporter = Reporter(self._robot, self._bus, commands.inlet)
+        reporter = Reporter(self._robot, self._bus)
         crew.start("diagnostics", lambda: reporter.run(stop))
         if opened.is_set():
             self._ready()

@@ -13,6 +13,7 @@ import zenoh
 from hal.access import access_list
 from hal.errors import BusError, ConfigError
 from hal.keys import Keys
+from hal.topics import ATTACHMENT_BYTES, COMMANDS, MESSAGE_BYTES, QUESTION_BYTES, TOPICS, named
 
 LEASE_MS = 2000
 OPEN_MS = 2000
@@ -21,11 +22,18 @@ FILES = 65536
 
 
 def open_session(
-    robot: str, listen: str | None, connect: str | None, keys: Keys | None, *, watch: bool = False
+    robot: str,
+    listen: str | None,
+    connect: str | None,
+    keys: Keys | None,
+    *,
+    prefix: str | None = None,
+    watch: bool = False,
 ) -> zenoh.Session:
     """Open one; the arguments are those of `hal.bus.Bus`. With neither address it is connected to nobody.
 
     Whoever listens is a robot, and lets others do what `hal/access.py` says. Whoever connects hears the robot alone.
+    What is longer than its topic allows ends here: neither is it put together nor does it wait in a queue.
 
     Raises `BusError`: if it does not connect, after `CONNECT_MS` at the latest; `ConfigError`: to listen with keys that
     are no robot's.
@@ -55,6 +63,8 @@ def open_session(
         # Whoever begins to connect and says no more holds up a close for this long.
         "transport/unicast/accept_timeout": OPEN_MS,
         "transport/link/tx/lease": LEASE_MS,
+        "transport/link/rx/max_message_size": MESSAGE_BYTES,
+        "low_pass_filter": _size_limits(robot if prefix is None else prefix),
         # It can lose a message when a receiver stalls.
         "transport/shared_memory/enabled": False,
         # Late readers of a latched topic are served by its time stamp.
@@ -84,6 +94,18 @@ def _make_room() -> None:
     wanted = FILES if hard == resource.RLIM_INFINITY else min(FILES, hard)
     if soft != resource.RLIM_INFINITY and soft < wanted:
         resource.setrlimit(resource.RLIMIT_NOFILE, (wanted, hard))
+
+
+def _size_limits(prefix: str) -> list[dict[str, object]]:
+    """How long a message that comes may be, by key."""
+    topics = (*TOPICS, *(named(topic, "*") for topic in COMMANDS))
+    limits = {topic.key: topic.max_bytes + ATTACHMENT_BYTES for topic in topics}
+    rules = [(["put"], f"{prefix}/{key}".lstrip("/"), limit) for key, limit in limits.items()]
+    rules.append((["query"], "**", QUESTION_BYTES + ATTACHMENT_BYTES))
+    return [
+        {"id": f"{number}", "flows": ["ingress"], "messages": messages, "key_exprs": [key], "size_limit": limit}
+        for number, (messages, key, limit) in enumerate(rules)
+    ]
 
 
 def _links(endpoint: str, keys: Keys | None) -> tuple[str, str]:

@@ -8,8 +8,9 @@ from typing import Any, Generic, TypeVar
 
 from zenoh import Priority, Reliability
 
-from hal.codec import ros_type_of
+from hal.codec import fixed_bytes, ros_type_of
 from hal.messages import (
+    STOP,
     Applied,
     BatteryState,
     Bool,
@@ -54,15 +55,26 @@ LATCHED = Qos(Reliability.RELIABLE, Priority.DATA, latched=True)
 LOCKSTEP = Qos(Reliability.RELIABLE, Priority.DATA, express=True, wait=True)
 
 
+# No payload is longer: what is, is dropped before anybody copies it.
+PICTURE_BYTES = 2 * 2**20
+SCAN_BYTES = 160 * 2**10  # of `hal.bounds.MOST_BEAMS` beams with intensities
+REPORT_BYTES = 64 * 2**10
+SMALL_BYTES = 2 * 2**10  # numbers, a header and a few short texts
+ATTACHMENT_BYTES = 256  # ours and those of ROS peers
+QUESTION_BYTES = 4 * 2**10
+MESSAGE_BYTES = 4 * 2**20  # of anything at all
+
+
 @dataclass(frozen=True, slots=True)
 class Topic(Generic[M]):
-    """One line of the table."""
+    """One line of the table. `max_bytes`: no payload is longer."""
 
     key: str
     kind: type[M]
     rate_hz: float
     max_age_s: float
     qos: Qos
+    max_bytes: int = SMALL_BYTES
 
     @property
     def ros_type(self) -> str:
@@ -70,9 +82,9 @@ class Topic(Generic[M]):
         return ros_type_of(self.kind)
 
 
-SCAN = Topic("scan", LaserScan, 10.0, 0.3, SENSOR)
-CAMERA = Topic("camera/color/image_raw/compressed", CompressedImage, 30.0, 0.3, PICTURE)
-DEPTH = Topic("camera/depth/image_raw/compressed", CompressedImage, 5.0, 0.6, PICTURE)  # for whoever asks
+SCAN = Topic("scan", LaserScan, 10.0, 0.3, SENSOR, SCAN_BYTES)
+CAMERA = Topic("camera/color/image_raw/compressed", CompressedImage, 30.0, 0.3, PICTURE, PICTURE_BYTES)
+DEPTH = Topic("camera/depth/image_raw/compressed", CompressedImage, 5.0, 0.6, PICTURE, PICTURE_BYTES)  # if asked for
 ODOM = Topic("odom", Odometry, 20.0, 0.3, URGENT)
 IMU = Topic("imu", Imu, 10.0, 0.3, SENSOR)
 RANGES = {
@@ -80,18 +92,18 @@ RANGES = {
     for frame_id in ("range_fl", "range_fr", "range_rl", "range_rr")
 }
 BATTERY = Topic("battery", BatteryState, 1.0, 5.0, LATCHED)
-CMD_VEL = Topic("cmd_vel", Twist, 20.0, 0.3, URGENT)
-TELEOP = Topic("cmd_vel/teleop", Twist, 30.0, 0.2, URGENT)
+CMD_VEL = Topic("cmd_vel", Twist, 20.0, 0.3, URGENT, fixed_bytes(STOP))
+TELEOP = Topic("cmd_vel/teleop", Twist, 30.0, 0.2, URGENT, fixed_bytes(STOP))
 APPLIED = Topic("cmd_vel/applied", Applied, 20.0, 0.3, URGENT)
-ESTOP = Topic("estop", Bool, 1.0, float("inf"), LATCHED)  # true presses; only a query releases
+ESTOP = Topic("estop", Bool, 1.0, float("inf"), LATCHED, fixed_bytes(Bool(False)))  # true presses
 JOY = Topic("joy", Joy, 30.0, 0.2, SENSOR)
 JOY_FEEDBACK = Topic("joy/feedback", JoyFeedback, 10.0, 0.2, REPORT)
 OPERATOR = Topic("operator", OperatorRequest, 5.0, 1.0, REPORT)  # asked later than this counts for nothing
-OPERATOR_ANSWER = Topic("operator/answer", OperatorAnswer, 1.0, 3.0, REPORT)
-DECISION = Topic("lira/decision", Decision, 5.0, 1.0, REPORT)
-DIAGNOSTICS = Topic("diagnostics", DiagnosticArray, 1.0, 3.0, REPORT)
+OPERATOR_ANSWER = Topic("operator/answer", OperatorAnswer, 1.0, 3.0, REPORT, REPORT_BYTES)
+DECISION = Topic("lira/decision", Decision, 5.0, 1.0, REPORT, REPORT_BYTES)
+DIAGNOSTICS = Topic("diagnostics", DiagnosticArray, 1.0, 3.0, REPORT, REPORT_BYTES)
 SIM_STATE = Topic("sim/state", CourseState, 20.0, 0.3, SENSOR)
-CLOCK = Topic("clock", Clock, 20.0, 0.3, URGENT)  # lockstep only: closes an observation
+CLOCK = Topic("clock", Clock, 20.0, 0.3, URGENT, fixed_bytes(Clock(0.0)))  # lockstep only: closes an observation
 
 TOPICS: tuple[Topic[Any], ...] = (
     SCAN,

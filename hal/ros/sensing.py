@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from hal.messages import BatteryState, CompressedImage, Image, LaserScan, Range
-from hal.pictures import is_sound
+from hal.pictures import objection
 from hal.ros.types import Codec, header, ros, stamp
 
 CHANNELS = {"rgb8": 3, "bgr8": 3, "rgba8": 4, "mono8": 1}
@@ -67,8 +67,8 @@ def _compressed_to(m: CompressedImage) -> Any:
 
 def _compressed_from(message: Any) -> CompressedImage:
     data = message.data.tobytes()
-    if not is_sound(data):
-        raise ValueError("a part of the picture is longer than the picture")
+    if why := objection(data):
+        raise ValueError(why)
     return CompressedImage(stamp(message), data, message.format)
 
 

@@ -60,7 +60,9 @@ def time_to(stamp_s: float) -> Any:
 
 
 def seconds(time: Any) -> float:
-    """Seconds of a time."""
+    """Seconds of a time. Raises `ValueError` for one that no clock shows."""
+    if time.nanosec >= 1_000_000_000:
+        raise ValueError(f"{time.sec} s and {time.nanosec} ns are no time")
     return float((time.sec * 1_000_000_000 + time.nanosec) / 1e9)
 
 

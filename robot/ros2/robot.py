@@ -157,15 +157,16 @@ class Ros2Robot:
         for name, reader in self._readers.items():
             for received in reader.poll():
                 news = True
-                value = received.message
-                if name in CLOCKS:
-                    with self._lock:
-                        self._clock.note(value.stamp_s, received.arrived_s)
-                if name == "scan":
-                    value = placed_scan(value, self._interface.lidar_yaw_rad)
-                elif name == "camera":
-                    value = plain_picture(value)
-                self._newest[name] = value
+                with self._bus.boundary.guard(name):
+                    value = received.message
+                    if name in CLOCKS:
+                        with self._lock:
+                            self._clock.note(value.stamp_s, received.arrived_s)
+                    if name == "scan":
+                        value = placed_scan(value, self._interface.lidar_yaw_rad)
+                    elif name == "camera":
+                        value = plain_picture(value)
+                    self._newest[name] = value
         return news
 
     def _silent(self) -> list[str]:

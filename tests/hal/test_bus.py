@@ -83,22 +83,26 @@ def test_garbage_is_counted_and_does_not_hide_what_is_good(pair):
     for payload in (b"", b"\x00\x01\x00\x00", b"\xff" * 60):
         raw.put(f"{client.robot}/cmd_vel", payload, priority=zenoh.Priority.REAL_TIME, express=True)
     publisher.put(Twist(0.5, 0.0), time_s=0.0)
-    wait_for(lambda: reader.newest() is not None and reader.dropped.total() == 3)
+    wait_for(lambda: reader.newest() is not None and sum(robot.boundary.counts.values()) == 3)
     assert reader.newest().message == Twist(0.5, 0.0)
-    assert reader.dropped == {"undecodable": 3}
+    assert robot.boundary.counts == {("cmd_vel", "undecodable"): 3}
 
 
 def test_questions_are_answered_refused_or_missed(pair):
     robot, client = pair
     with pytest.raises(BusError, match=f"no robot named '{client.robot}' answers 'info' at .*lira twin"):
         client.ask("info", timeout_s=0.2)
-    poll = robot.questions("info")
+    questions = robot.questions("info")
 
     def serve(reply):
         def work():
             found = []
-            wait_for(lambda: bool(found) or ((q := poll()) is not None and not found.append(q)))
-            reply(found[0])
+
+            def answer(question):
+                found.append(question)
+                reply(question)
+
+            wait_for(lambda: questions.serve(answer) or bool(found))
 
         thread = threading.Thread(target=work)
         thread.start()

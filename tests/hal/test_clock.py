@@ -4,7 +4,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from hal.clock import WINDOW_S, ClockEstimate
+from hal.clock import HEAL_S, LEAP_S, SILENT_S, WINDOW_S, ClockEstimate
 
 
 def test_the_most_prompt_message_counts():
@@ -63,3 +63,50 @@ def test_a_restarted_robot_starts_a_new_estimate():
     assert not clock.known
     clock.note(1.0, 11.0)
     assert clock.now(11.5) == 1.5
+
+
+def test_one_message_from_far_ahead_does_not_hold_it():
+    clock, local_s = ClockEstimate(), 10.0
+    for step in range(40):
+        local_s = 10.0 + 0.05 * step
+        clock.note(local_s + 100.0, local_s)
+        clock.note(local_s + 100.0 + (LEAP_S + 0.01 if step % 2 else 1e6), local_s)
+        assert clock.now(local_s) == pytest.approx(local_s + 100.0)
+
+
+def test_a_clock_that_was_set_ahead_is_followed():
+    clock = ClockEstimate()
+    clock.note(100.0, 10.0)
+    for local_s in (10.5, 10.9):
+        clock.note(local_s + 5000.0, local_s)
+        assert clock.now(local_s) == pytest.approx(local_s + 90.0)
+    local_s = 10.0 + HEAL_S
+    clock.note(local_s + 5000.0, local_s)
+    assert clock.now(local_s) == pytest.approx(local_s + 5000.0)
+
+
+def test_what_was_held_back_for_seconds_and_what_follows_it_are_followed():
+    clock = ClockEstimate()
+    clock.note(100.0, 10.0)
+    for step in range(60):
+        clock.note(100.0 + 0.05 * step, 13.0)  # three seconds' messages in one burst
+    clock.note(103.0, 13.0)
+    assert clock.now(13.0) == pytest.approx(103.0)
+
+
+def test_who_speaks_between_a_robots_words_is_not_the_robot():
+    clock = ClockEstimate()
+    for step in range(40):
+        local_s = 10.0 + 0.05 * step
+        assert clock.hear(1, local_s + 100.0, local_s)
+        assert not clock.hear(2 + step, 1e6, local_s + 0.01)
+        assert clock.now(local_s) == pytest.approx(local_s + 100.0)
+
+
+def test_a_robot_that_was_silent_and_has_another_session_was_started_anew():
+    clock = ClockEstimate()
+    assert clock.hear(1, 1000.0, 10.0)
+    assert clock.now(10.0) == 1000.0
+    assert not clock.hear(2, 1.0, 10.0 + SILENT_S - 0.01)
+    assert clock.hear(2, 1.0, 10.0 + SILENT_S)
+    assert clock.now(10.0 + SILENT_S) == 1.0

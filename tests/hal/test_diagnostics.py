@@ -46,7 +46,7 @@ def test_what_is_refused_and_the_state_are_published():
 
         def told():
             found = status(reader, "governor")
-            return found is not None and {"refused: another commander", "refused: undecodable"} <= {
+            return found is not None and {"refused: another commander", "refused: cmd_vel: undecodable"} <= {
                 key for key, value in found.values if value != "0"
             }
 

@@ -57,7 +57,7 @@ def targets() -> list[Target]:
     pictures = tuple(compress(picture, encoding).data for encoding in ("jpeg", "png"))
     return [
         *found,
-        Target("attachment", parse_attachment, (), (Attachment(1, 2, 3, 4).to_bytes(),)),
+        Target("attachment", parse_attachment, (LiraError,), (Attachment(1, 2, 3, 4).to_bytes(),)),
         Target("profile", profile_from_json, (LiraError,), (profile.to_json(),)),
         Target("info", info_from_json, (LiraError,), (Info(profile, REALTIME, 1).to_json(),)),
         Target("episode", partial(msgspec.json.decode, type=Episode), json_errors, (msgspec.json.encode(Episode()),)),

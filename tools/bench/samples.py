@@ -53,7 +53,6 @@ MESSAGES: list[object] = [
     CompressedImage(1.0, b"\xff\xd8 not really \xff\xd9", "jpeg"),
     compress(Image(1.0, np.arange(48, dtype=np.uint8).reshape(4, 4, 3)), "png"),
     Odometry(1.5, 1.0, -2.0, 0.75, 0.5, -0.25),
-    Odometry(1.5, NAN, INF, 0.75, NAN, -0.25),
     Imu(1.5, -0.75, 0.5, 9.0, -9.0),
     Range(1.5, "range_fl", 0.5, 0.03125, 0.875),
     Range(1.5, "range_rr", INF, 0.03125, 0.875),

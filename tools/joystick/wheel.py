@@ -67,7 +67,7 @@ class Wheel:
         self.paused = False
         self.experts: tuple[str, ...] = ()
         self._clock = ClockEstimate()
-        self._epoch = -1
+        self._epoch: int | None = None  # of the robot that is heard
 
     @property
     def known(self) -> bool:
@@ -78,13 +78,9 @@ class Wheel:
         """Follow the robot's clock. Returns the newest of what was applied since the last time."""
         newest = None
         for received in self._results.poll():
-            newest = received.message
-            if (sent := received.attachment) is None:
-                continue
-            if sent.epoch != self._epoch:
-                self._epoch = sent.epoch
-                self._clock.restart()
-            self._clock.note(sent.time_s, received.arrived_s)
+            sent = received.attachment
+            if sent is not None and self._clock.hear(sent.epoch, sent.time_s, received.arrived_s):
+                newest, self._epoch = received.message, sent.epoch
         return newest
 
     def drive(self, action: Action, released: bool, local_s: float) -> None:
@@ -147,7 +143,7 @@ class Wheel:
     def _ask(self, pressed: bool) -> None:
         ask = press_estop if pressed else release_estop
         try:
-            state = ask(self._bus, epoch=self._epoch if self._clock.known else None)
+            state = ask(self._bus, epoch=self._epoch)
         except BusError as error:
             self._say(f"EMERGENCY STOP NOT ACKNOWLEDGED: {error}" if pressed else f"not released: {error}")
         else:

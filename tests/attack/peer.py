@@ -1,0 +1,74 @@
+"""Peers in processes of their own: `peer.py drive NAME ENDPOINT LOG`, `peer.py flood NAME ENDPOINT SIZE KEY...`,
+`peer.py ask NAME ENDPOINT SIZE KEY...`.
+
+The driver notes the time of every command just before it sends it.
+"""
+
+import itertools
+import sys
+import time
+from pathlib import Path
+
+import zenoh
+from zenoh.handlers import RingChannel
+
+from hal.bus import Bus, Publisher
+from hal.messages import HELD, STOP, Command, Reason, Twist
+from hal.remote import RemoteRobot
+
+GO = Twist(0.15, 0.0)
+PERIOD_S = 0.03
+
+
+def drive(name, endpoint, log):
+    """Drive on and on, as far as the robot lets one."""
+    with Path(log).open("w", buffering=1) as notes:
+        put = Publisher.put
+
+        def noted(self, message, *words, **more):
+            if isinstance(message, Twist):
+                notes.write(f"{time.monotonic()}\n")
+            put(self, message, *words, **more)
+
+        Publisher.put = noted
+        robot = RemoteRobot(Bus(name, connect=endpoint), answer_s=20.0)
+        robot.open()
+        print("drives", flush=True)
+        reason = Reason.NO_COMMAND
+        while True:
+            stands = reason in HELD or reason is Reason.NO_COMMAND
+            reason = robot.drive(Command(STOP if stands else GO, robot.now())).reason
+            time.sleep(PERIOD_S)
+
+
+def flood(name, endpoint, size, *keys):
+    """Put as much as the link takes, which is neither text nor a number that anybody could use."""
+    session = _session(name, endpoint)
+    publishers = [
+        session.declare_publisher(
+            f"{name}/{key}", priority=zenoh.Priority.REAL_TIME, reliability=zenoh.Reliability.RELIABLE, express=True
+        )
+        for key in keys
+    ]
+    payload = b"\x00\x01\x00\x00" + b"\x7f" * (int(size) - 4)
+    print("floods", flush=True)
+    for publisher in itertools.cycle(publishers):
+        publisher.put(payload)
+
+
+def ask(name, endpoint, size, *keys):
+    """Ask without waiting for any answer."""
+    session = _session(name, endpoint)
+    print("asks", flush=True)
+    for key in itertools.cycle(keys):
+        session.get(f"{name}/{key}", RingChannel(1), payload=b"x" * int(size), timeout=2.0)
+
+
+def _session(name, endpoint):
+    bus = Bus(name, connect=endpoint)
+    time.sleep(1.0)  # until it is up, on both links
+    return bus._session
+
+
+if __name__ == "__main__":
+    {"drive": drive, "flood": flood, "ask": ask}[sys.argv[1]](*sys.argv[2:])

@@ -1,0 +1,58 @@
+"""Peers that send as much as they can, and a driver that is killed meanwhile: the wheels stop in time all the same."""
+
+import time
+
+import pytest
+from scene import Scene, kill, moved_on_s
+
+from hal.bus import Bus
+from hal.desk import info_from_json
+from hal.topics import CMD_VEL, ESTOP_PRESS, ESTOP_RELEASE, INFO, RESET, TELEOP, TOPICS
+
+ROUNDS = 2
+FLOOD_S = 1.5
+BUDGET_S = 0.35
+MEMORY_MB = 300
+EVERYWHERE = [topic.key for topic in TOPICS if topic.key != "estop"]  # a flood there is a press
+SMALL = ("flood", 52, [CMD_VEL.key])
+LARGE = ("flood", 1_000_000, [CMD_VEL.key])
+HUGE = ("flood", 50_000_000, EVERYWHERE)
+QUERIES = ("ask", 60, [INFO, RESET, ESTOP_PRESS, ESTOP_RELEASE])
+LONG_QUERIES = ("ask", 1_000_000, [INFO, RESET, ESTOP_PRESS, ESTOP_RELEASE])
+
+SCENES = [
+    ("null", [SMALL, SMALL]),
+    ("null", [HUGE]),
+    ("null", [LONG_QUERIES]),
+    ("twin", [LARGE, LARGE]),
+    ("twin", [("flood", 1_000_000, EVERYWHERE), QUERIES]),
+    ("wire", [LARGE, LARGE]),
+    ("ros2", [LARGE, ("flood", 1_000_000, [TELEOP.key])]),
+    ("ros2", [QUERIES]),
+]
+
+
+@pytest.mark.parametrize(("kind", "attacks"), SCENES)
+def test_whoever_floods_the_wheels_stop_in_time_and_memory_stays_small(kind, attacks, tmp_path):
+    with Scene(kind, tmp_path) as scene:
+        before_mb = scene.memory_mb()
+        attackers = []
+        for _ in range(ROUNDS):
+            driver, commands = scene.driver()
+            if not attackers:
+                assert scene.wait(scene.moves, 10.0)
+                attackers = [scene.attacker(*attack) for attack in attacks]
+                time.sleep(FLOOD_S)
+            scene.wait(scene.moves, 3.0)  # a flood may keep the driver's commands away; then it stands
+            kill(driver)
+            assert scene.wait(lambda: not scene.moves(), 5.0)
+            time.sleep(0.3)
+            assert moved_on_s(scene.orders(), commands) <= BUDGET_S
+        assert scene.robot.status() is None
+        assert scene.memory_mb() - before_mb < MEMORY_MB / 3
+        assert scene.memory_mb() < MEMORY_MB
+        for attacker in attackers:
+            kill(attacker)
+        bus = Bus(scene.name, connect=scene.endpoint)
+        assert info_from_json(bus.ask(INFO, timeout_s=5.0)).profile.name
+        assert bus.close()
