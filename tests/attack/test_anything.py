@@ -3,10 +3,11 @@
 import json
 import struct
 import time
+from contextlib import contextmanager
 
 import numpy as np
 import pytest
-from hypothesis import HealthCheck, given, settings
+from hypothesis import HealthCheck, Phase, given, settings
 from hypothesis import strategies as st
 from scene import Scene, kill
 from zenoh.handlers import RingChannel
@@ -18,7 +19,7 @@ from hal.desk import info_from_json
 from hal.estop import release_estop
 from hal.messages import STOP, Applied, Bool, Clock, Command, LaserScan, Odometry, Twist
 from hal.remote import RemoteRobot
-from hal.topics import ESTOP_LOOK, ESTOP_PRESS, ESTOP_RELEASE, INFO, RESET, TOPICS
+from hal.topics import CMD_VEL, ESTOP_LOOK, ESTOP_PRESS, ESTOP_RELEASE, INFO, RESET, TOPICS
 
 EXAMPLES = 15
 MORE_MB = 80
@@ -48,7 +49,7 @@ SPOILT = st.builds(
     lambda payload, at, byte: payload[: at % (len(payload) + 1)] + byte + payload[at % (len(payload) + 1) + 1 :],
     *[MESSAGES, st.integers(0, 4000), st.binary(max_size=8)],
 )
-ZEROS = st.builds(lambda n: b"\0\1\0\0" + bytes(n), st.integers(0, 10**6))
+ZEROS = st.integers(0, 10**6)  # so many of them
 PAYLOADS = MESSAGES | SPOILT | ZEROS | st.binary(max_size=200)
 # Whether the emergency stop holds afterwards is not what is asked here, and motion would be somebody's command.
 KEYS = st.sampled_from([*(topic.key for topic in TOPICS), "nothing", "cmd_vel/a/b"])
@@ -58,31 +59,51 @@ EPISODES = st.fixed_dictionaries(
 ASKED = [INFO, RESET, ESTOP_PRESS, ESTOP_RELEASE, ESTOP_LOOK, "**"]
 QUESTIONS = st.binary(max_size=50) | EPISODES.map(str.encode) | st.sampled_from([b"[" * 5000, b'{"start_m":1e308}'])
 
+
+class Thrown(list):
+    """Actions that do not fill the page when they kill a robot."""
+
+    def __repr__(self):
+        return f"{super().__repr__():.3000}"
+
+
 ACTIONS = st.lists(
     st.one_of(
+        st.tuples(st.just("put"), st.sampled_from(["cmd_vel", "cmd_vel/teleop"]), st.just(encode(STOP)), FRESH),
         st.tuples(st.just("put"), KEYS, PAYLOADS, ATTACHMENTS),
         st.tuples(st.just("delete"), KEYS, st.none(), ATTACHMENTS),
         st.tuples(st.just("ask"), st.sampled_from(ASKED), QUESTIONS, ATTACHMENTS),
     ),
     min_size=10,
     max_size=40,
-)
+).map(Thrown)
 
 
 def act(session, prefix, actions):
     for what, key, payload, attachment in actions:
         if what == "put":
-            session.put(f"{prefix}{key}", payload, attachment=attachment)
+            data = b"\0\1\0\0" + bytes(payload) if isinstance(payload, int) else payload
+            session.put(f"{prefix}{key}", data, attachment=attachment)
         elif what == "delete":
             session.delete(f"{prefix}{key}", attachment=attachment)
         else:
             session.get(f"{prefix}{key}", RingChannel(1), payload=payload, attachment=attachment, timeout=1.0)
 
 
+@contextmanager
+def joined(scene):
+    bus = Bus(scene.name, connect=scene.endpoint)
+    publisher = bus.publisher(CMD_VEL)
+    assert scene.wait(lambda: publisher.matching, 5.0)
+    yield bus
+    assert bus.close()
+
+
 def attack(scene, session, prefix):
     """Throw many lists of actions at it; it answers in between."""
 
-    @settings(max_examples=EXAMPLES, deadline=None, suppress_health_check=list(HealthCheck), database=None)
+    # A robot that is dead cannot be asked again, so what killed it is not made smaller.
+    @settings(max_examples=EXAMPLES, deadline=None, phases=[Phase.generate], suppress_health_check=list(HealthCheck))
     @given(ACTIONS)
     def throw(actions):
         act(session, prefix, actions)
@@ -93,12 +114,11 @@ def attack(scene, session, prefix):
 
 @pytest.mark.parametrize("kind", ["null", "twin", "ros2"])
 def test_whatever_is_sent_it_lives_stands_and_drives_who_may(kind, tmp_path):
-    with Scene(kind, tmp_path) as scene:
+    with Scene(kind, tmp_path) as scene, joined(scene) as bus:
         driver, _ = scene.driver()
         assert scene.wait(scene.moves, 10.0)
         kill(driver)
         before_mb = scene.memory_mb()
-        bus = Bus(scene.name, connect=scene.endpoint)
         attack(scene, bus._session, f"{scene.name}/")
         assert info_from_json(bus.ask(INFO, timeout_s=5.0)).profile.name
         assert scene.wait(lambda: not scene.moves(), 2.0)
@@ -109,7 +129,6 @@ def test_whatever_is_sent_it_lives_stands_and_drives_who_may(kind, tmp_path):
         scene.driver()
         assert scene.wait(scene.moves, 10.0)
         assert scene.memory_mb() - before_mb < MORE_MB
-        assert bus.close()
 
 
 def test_whatever_a_robot_behind_a_bridge_sends_it_lives_and_stands(tmp_path):
@@ -125,8 +144,7 @@ def test_whatever_a_robot_behind_a_bridge_sends_it_lives_and_stands(tmp_path):
 
 
 def test_whatever_is_sent_lockstep_goes_on(tmp_path):
-    with Scene("lockstep", tmp_path) as scene:
-        bus = Bus(scene.name, connect=scene.endpoint)
+    with Scene("lockstep", tmp_path) as scene, joined(scene) as bus:
         attack(scene, bus._session, f"{scene.name}/")
         release_estop(bus)
         robot = RemoteRobot(bus)
@@ -136,16 +154,13 @@ def test_whatever_is_sent_lockstep_goes_on(tmp_path):
             robot.wait(robot.now() + robot.profile.period_s)
         assert applied.twist == Twist(0.15, 0.0)
         robot.close()
-        assert bus.close()
 
 
 def test_one_sample_with_the_largest_count_ends_nothing(tmp_path):
-    with Scene("null", tmp_path) as scene:
-        bus = Bus(scene.name, connect=scene.endpoint)
+    with Scene("null", tmp_path) as scene, joined(scene) as bus:
         for seq in (2**63, 2**64 - 1, 2**63 - 1):
             attachment = struct.pack("<4sQQqqB", MAGIC, 5, seq, time.monotonic_ns(), -1, 0)
             bus._session.put(f"{scene.name}/cmd_vel", encode(STOP), attachment=attachment)
-        time.sleep(0.5)
+            time.sleep(0.2)
         scene.driver()
         assert scene.wait(scene.moves, 10.0)
-        assert bus.close()

@@ -2,13 +2,15 @@
 
 import threading
 import time
+from types import SimpleNamespace
 
 import pytest
 import zenoh
 from wiring import joined, new_endpoint, new_name, real_time_null, remote, served, wait_for
 
 from hal.attachment import Attachment
-from hal.bus import QUESTIONS, Bus
+from hal.boundary import Boundary
+from hal.bus import QUESTIONS, Bus, Reader
 from hal.codec import encode
 from hal.errors import BusError
 from hal.inlet import BURST, DEPTH, EPOCHS, ESTOP_DEPTH, Inlet, Order
@@ -94,6 +96,35 @@ def test_a_poll_ends_however_much_there_is(pair):
     assert reader.full
     assert reader.poll() == []
     assert not reader.full
+
+
+class Endless:
+    """A subscriber whose peer is always faster."""
+
+    def __init__(self, payload):
+        self.taken = 0
+        self._sample = SimpleNamespace(payload=payload, attachment=None)
+
+    def try_recv(self):
+        self.taken += 1
+        return self._sample
+
+
+class Untouchable(bytes):
+    """A payload that is not to be copied."""
+
+    def __bytes__(self):
+        raise AssertionError("copied")
+
+
+@pytest.mark.parametrize("payload", [encode(GO), b"garbage", Untouchable(1000)])
+def test_a_poll_ends_although_there_is_always_more(payload):
+    endless, boundary = Endless(payload), Boundary()
+    reader = Reader(SimpleNamespace(closed=False), SimpleNamespace(now=endless), CMD_VEL, DEPTH, boundary)
+    reader.poll()
+    assert endless.taken == DEPTH
+    assert reader.full
+    assert set(boundary.counts) <= {("cmd_vel", "undecodable"), ("cmd_vel", "too long")}
 
 
 def test_a_press_among_ever_so_many_idle_messages_is_not_lost(pair):
