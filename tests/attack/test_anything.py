@@ -16,7 +16,7 @@ from hal.attachment import MAGIC
 from hal.bus import Bus
 from hal.codec import encode
 from hal.desk import info_from_json
-from hal.estop import release_estop
+from hal.estop import look_at_estop, release_estop
 from hal.messages import STOP, Applied, Bool, Clock, Command, LaserScan, Odometry, Twist
 from hal.remote import RemoteRobot
 from hal.topics import CMD_VEL, ESTOP_LOOK, ESTOP_PRESS, ESTOP_RELEASE, INFO, RESET, TOPICS
@@ -125,6 +125,7 @@ def test_whatever_is_sent_it_lives_stands_and_drives_who_may(kind, tmp_path):
         began = len(scene.orders())
         time.sleep(1.0)
         assert {linear for _, linear in scene.orders()[began:]} == {0.0}
+        look_at_estop(bus)  # then all that was pressed before has been served
         release_estop(bus)
         scene.driver()
         assert scene.wait(scene.moves, 10.0)
@@ -146,6 +147,7 @@ def test_whatever_a_robot_behind_a_bridge_sends_it_lives_and_stands(tmp_path):
 def test_whatever_is_sent_lockstep_goes_on(tmp_path):
     with Scene("lockstep", tmp_path) as scene, joined(scene) as bus:
         attack(scene, bus._session, f"{scene.name}/")
+        look_at_estop(bus)  # then all that was pressed before has been served
         release_estop(bus)
         robot = RemoteRobot(bus)
         robot.open()
