@@ -20,7 +20,7 @@ from hal.attachment import Attachment, parse_attachment
 from hal.boundary import Boundary
 from hal.codec import decode, encode
 from hal.connection import Connection, Declared
-from hal.errors import BusError, ConfigError
+from hal.errors import BusError, CodecError, ConfigError
 from hal.keys import Keys, keys_from_environment, load_keys
 from hal.refusals import Refusals
 from hal.session import open_session
@@ -464,7 +464,10 @@ class Bus:
 
 
 def _attachment(carrier: zenoh.Query | zenoh.Sample) -> Attachment | None:
-    return parse_attachment(None if carrier.attachment is None else bytes(carrier.attachment))
+    try:
+        return parse_attachment(None if carrier.attachment is None else bytes(carrier.attachment))
+    except CodecError:
+        return None
 
 
 def _is_loopback(endpoint: str) -> bool:

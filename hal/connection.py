@@ -133,8 +133,7 @@ class Connection:
         while not self._closed.wait(STALE_S):
             if not self.trouble and not stale():
                 continue
-            if not self.trouble:
-                self._let_all_go()
+            self._let_all_go()
             try:
                 session = listen()
             except LiraError as error:

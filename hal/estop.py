@@ -10,7 +10,7 @@ from collections.abc import Callable
 
 import msgspec
 
-from hal.bus import Bus, Question, Questions
+from hal.bus import Bus, Question
 from hal.errors import BusError
 from hal.governed import GovernedRobot
 from hal.topics import ESTOP_LOOK, ESTOP_PRESS, ESTOP_RELEASE
@@ -47,16 +47,13 @@ class EstopDesk:
 
     def serve(self) -> None:
         """Do and answer what was asked since the last time. What is pressed together with a release stays pressed."""
-        self._serve(self._released, self._robot.release_estop)
-        self._serve(self._pressed, self._robot.press_estop)
-        self._serve(self._looked, lambda: None)
+        self._released.serve(lambda question: self._do(self._robot.release_estop, question))
+        self._pressed.serve(lambda question: self._do(self._robot.press_estop, question))
+        self._looked.serve(lambda question: self._do(lambda: None, question))
 
-    def _serve(self, asked: Questions, act: Callable[[], object]) -> None:
-        def answer(question: Question) -> None:
-            act()
-            question.answer(msgspec.json.encode(EstopState(self._robot.state, self._robot.refused)))
-
-        asked.serve(answer)
+    def _do(self, act: Callable[[], object], question: Question) -> None:
+        act()
+        question.answer(msgspec.json.encode(EstopState(self._robot.state, self._robot.refused)))
 
 
 def press_estop(bus: Bus, timeout_s: float = ANSWER_S, epoch: int | None = None) -> EstopState:

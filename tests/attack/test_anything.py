@@ -16,10 +16,10 @@ from hal.attachment import MAGIC
 from hal.bus import Bus
 from hal.codec import encode
 from hal.desk import info_from_json
-from hal.estop import release_estop
+from hal.estop import look_at_estop, release_estop
 from hal.messages import STOP, Applied, Bool, Clock, Command, LaserScan, Odometry, Twist
 from hal.remote import RemoteRobot
-from hal.topics import CMD_VEL, ESTOP_QUERY, INFO, RESET, TOPICS
+from hal.topics import CMD_VEL, ESTOP_LOOK, ESTOP_PRESS, ESTOP_RELEASE, INFO, RESET, TOPICS
 
 EXAMPLES = 15
 MORE_MB = 80
@@ -56,6 +56,7 @@ KEYS = st.sampled_from([*(topic.key for topic in TOPICS), "nothing", "cmd_vel/a/
 EPISODES = st.fixed_dictionaries(
     {"layout": SIGNED, "start_m": NUMBERS, "lateral_m": NUMBERS, "yaw_rad": NUMBERS, "began_m": st.none() | NUMBERS}
 ).map(json.dumps)
+ASKED = [INFO, RESET, ESTOP_PRESS, ESTOP_RELEASE, ESTOP_LOOK, "**"]
 QUESTIONS = st.binary(max_size=50) | EPISODES.map(str.encode) | st.sampled_from([b"[" * 5000, b'{"start_m":1e308}'])
 
 
@@ -71,7 +72,7 @@ ACTIONS = st.lists(
         st.tuples(st.just("put"), st.sampled_from(["cmd_vel", "cmd_vel/teleop"]), st.just(encode(STOP)), FRESH),
         st.tuples(st.just("put"), KEYS, PAYLOADS, ATTACHMENTS),
         st.tuples(st.just("delete"), KEYS, st.none(), ATTACHMENTS),
-        st.tuples(st.just("ask"), st.sampled_from([INFO, RESET, ESTOP_QUERY, "**"]), QUESTIONS, ATTACHMENTS),
+        st.tuples(st.just("ask"), st.sampled_from(ASKED), QUESTIONS, ATTACHMENTS),
     ),
     min_size=10,
     max_size=40,
@@ -124,6 +125,7 @@ def test_whatever_is_sent_it_lives_stands_and_drives_who_may(kind, tmp_path):
         began = len(scene.orders())
         time.sleep(1.0)
         assert {linear for _, linear in scene.orders()[began:]} == {0.0}
+        look_at_estop(bus)  # then all that was pressed before has been served
         release_estop(bus)
         scene.driver()
         assert scene.wait(scene.moves, 10.0)
@@ -145,6 +147,7 @@ def test_whatever_a_robot_behind_a_bridge_sends_it_lives_and_stands(tmp_path):
 def test_whatever_is_sent_lockstep_goes_on(tmp_path):
     with Scene("lockstep", tmp_path) as scene, joined(scene) as bus:
         attack(scene, bus._session, f"{scene.name}/")
+        look_at_estop(bus)  # then all that was pressed before has been served
         release_estop(bus)
         robot = RemoteRobot(bus)
         robot.open()

@@ -7,7 +7,7 @@ from scene import Scene, kill, moved_on_s
 
 from hal.bus import Bus
 from hal.desk import info_from_json
-from hal.topics import CMD_VEL, ESTOP_QUERY, INFO, RESET, TELEOP, TOPICS
+from hal.topics import CMD_VEL, ESTOP_PRESS, ESTOP_RELEASE, INFO, RESET, TELEOP, TOPICS
 
 ROUNDS = 2
 FLOOD_S = 1.5
@@ -17,8 +17,8 @@ EVERYWHERE = [topic.key for topic in TOPICS if topic.key != "estop"]  # a flood 
 SMALL = ("flood", 52, [CMD_VEL.key])
 LARGE = ("flood", 1_000_000, [CMD_VEL.key])
 HUGE = ("flood", 50_000_000, EVERYWHERE)
-QUERIES = ("ask", 60, [INFO, RESET, ESTOP_QUERY])
-LONG_QUERIES = ("ask", 1_000_000, [INFO, RESET, ESTOP_QUERY])
+QUERIES = ("ask", 60, [INFO, RESET, ESTOP_PRESS, ESTOP_RELEASE])
+LONG_QUERIES = ("ask", 1_000_000, [INFO, RESET, ESTOP_PRESS, ESTOP_RELEASE])
 
 SCENES = [
     ("null", [SMALL, SMALL]),

@@ -47,7 +47,7 @@ def passes(message):
     "message",
     [
         Twist(NAN, INF),  # the governor stops the robot for it
-        Applied(STOP, 1.0, epoch=2**64 - 1, seq=2**63 - 1),
+        Applied(STOP, 1.0, session=2**64 - 1, seq=2**63 - 1),
         BatteryState(1_700_000_000.0, NAN),
         Range(1.0, "range_fl", INF, 0.1, 0.9),
         Range(1.0, "range_fl", -INF, 0.1, 0.9),
