@@ -10,6 +10,7 @@ import msgspec
 from safetensors import SafetensorError, safe_open
 from safetensors.numpy import save
 
+from fusion.kernel_net import KernelNet
 from fusion.networks import IMAGE_PX, CameraNet, FusionNet, Kind, LidarNet, Network
 from hal.errors import StorageError
 
@@ -91,4 +92,6 @@ def build(checkpoint: Checkpoint) -> Network:
         return CameraNet(checkpoint.filters, px=checkpoint.px, seed=checkpoint.seed)
     if checkpoint.kind == "lidar":
         return LidarNet(checkpoint.bins, seed=checkpoint.seed)
+    if checkpoint.kind == "kernel":
+        return KernelNet(checkpoint.bins, checkpoint.filters, px=checkpoint.px)
     return FusionNet(checkpoint.bins, checkpoint.filters, px=checkpoint.px, seed=checkpoint.seed)

@@ -17,7 +17,7 @@ def load_network(name_or_path: str, profile: RobotProfile, pair: str = DEFAULT) 
     network, checkpoint = load_checkpoint(path)
     shape = profile.features
     needs = {"camera": shape.filters == checkpoint.filters, "lidar": shape.bins == checkpoint.bins}
-    fits = all(needs.values()) if checkpoint.kind == "fusion" else needs[checkpoint.kind]
+    fits = needs.get(checkpoint.kind, all(needs.values()))
     if not fits:
         raise ConfigError(
             f"{path} was trained for '{checkpoint.profile}' ({checkpoint.bins} beams, {checkpoint.filters} filters), "

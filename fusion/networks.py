@@ -21,7 +21,7 @@ HIDDEN = 64  # units of a lidar layer
 FUSION_HIDDEN = 128
 IMAGE_PX = 32
 
-Kind = Literal["camera", "lidar", "fusion"]
+Kind = Literal["camera", "lidar", "fusion", "kernel"]
 Weights = dict[str, NDArray[np.float32]]
 """All parameters of a network by name, detached from it."""
 

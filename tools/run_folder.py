@@ -1,14 +1,12 @@
 """What a learning run leaves in its folder: every label, the record of its steps, and the novice."""
 
 import argparse
-import copy
 import shlex
 import sys
 from collections.abc import Callable
 from pathlib import Path
 
 from fusion.checkpoint import Checkpoint, save_checkpoint
-from fusion.ensemble import EnsembleNet
 from fusion.novice import Novice
 from fusion.presets import method_named
 from fusion.record import RunRecord
@@ -47,11 +45,9 @@ def snapshot(
 
     `sync` makes sure of the labels. The writing raises `StorageError`.
     """
-    labels, steps, network = novice.stored, novice.training_steps, copy.deepcopy(novice.network)
-    if isinstance(network, EnsembleNet):
-        network = network.novice()
+    labels, steps, network = novice.stored, novice.training_steps, novice.frozen()
     sizes = profile.features.bins, profile.features.filters
-    about = Checkpoint("fusion", *sizes, profile.name, None, command(args), args.seed)
+    about = Checkpoint(network.kind, *sizes, profile.name, None, command(args), args.seed)
 
     def write() -> str:
         sync()

@@ -12,7 +12,7 @@ from fusion.demonstrations import DemonstrationLog
 from fusion.journal import Journal
 from fusion.presets import METHODS
 from fusion.record import LapRecord, ResultRecord, RunRecord, RunWriter, StepRecord, read_run
-from fusion.session import Session
+from fusion.session import Same, Session
 from fusion.teacher import SKILLED
 from fusion.trainer import ProcessTrainer
 from hal.governed import GovernedRobot
@@ -115,7 +115,7 @@ def test_in_process_gives_the_same_decisions_as_over_the_bus(demos, world, one_t
             loop = ControlLoop(robot, truth=twin.state)
             session = Session(robot, twin, loop, Journal(keep=log.append, write=record.write), method)
             loop.arm()
-            session.teach([lap(profile, floor, 0)], teacher(SKILLED, profile, floor, 0, 0), LAPS)
+            session.teach(Same([lap(profile, floor, 0)]), teacher(SKILLED, profile, floor, 0, 0), LAPS)
     finally:
         method.novice.close()
         robot.close()

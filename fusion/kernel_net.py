@@ -1,0 +1,80 @@
+"""The novice of `fusion/kernel.py` as a network that drives alone, and as a file."""
+
+from collections.abc import Mapping
+from typing import Any
+
+import torch
+from numpy.typing import NDArray
+from torch import Tensor
+
+from fusion.kernel import kernel, unit
+from fusion.networks import IMAGE_PX, CameraNet, CameraTrunk, LidarNet, LidarTrunk, Network
+
+
+class KernelNet(Network):
+    """The regression when nobody teaches it any more: both experts' trunks, the examples in use, and their solution.
+
+    Its weights are the trunks' and, for n examples, `x` [n, size], `y` [n, 2] and `noise` [n], the length scales
+    [l_c, l_d], the deviations s [2] and the gain g [1], all as in `fusion/kernel.py`. n is whatever a file holds.
+    """
+
+    kind = "kernel"
+    x: Tensor
+    y: Tensor
+    noise: Tensor
+    lengths: Tensor
+    scale: Tensor
+    gain: Tensor
+
+    def __init__(self, bins: int, filters: int, *, px: int = IMAGE_PX) -> None:
+        super().__init__()
+        self.camera, self.lidar = CameraTrunk(filters, px), LidarTrunk(bins)
+        size = self.camera.size + self.lidar.size
+        shapes = {"x": (0, size), "y": (0, 2), "noise": (0,), "lengths": (2,), "scale": (2,), "gain": (1,)}
+        for name, shape in shapes.items():
+            self.register_buffer(name, torch.ones(shape))
+        self.requires_grad_(False)
+        self._solve()
+
+    @classmethod
+    def from_experts(cls, camera: CameraNet, lidar: LidarNet) -> "KernelNet":
+        """Build one that sees as the experts do and knows nothing."""
+        network = cls(lidar.trunk.bins, camera.trunk.filters, px=camera.trunk.px)
+        network.camera.load_state_dict(camera.trunk.state_dict())
+        network.lidar.load_state_dict(lidar.trunk.state_dict())
+        return network
+
+    def features(self, scan: Tensor, image: Tensor, /) -> Tensor:
+        """x [n, size]."""
+        return unit(torch.cat([self.camera(image), self.lidar(scan)], dim=1), self.camera.size)
+
+    def head(self, features: Tensor) -> Tensor:
+        """m(x), the turn times g, clipped."""
+        actions: Tensor = (self._k(features) @ self._a).float() * self._gains
+        return actions.clamp(-1.0, 1.0)
+
+    def deviation(self, scan: Tensor, image: Tensor) -> Tensor:
+        """sd(x) [n, 2] of the mean's two actions."""
+        k = self._k(self.features(scan, image))
+        variance = 1.0 - torch.einsum("ni,ij,nj->n", k, self._p, k)
+        return variance.clamp(min=0.0).sqrt()[:, None].float() * self.scale
+
+    def load_weights(self, weights: Mapping[str, NDArray[Any]]) -> None:
+        """Put weights of any number of examples in. Raises `ValueError` where they do not fit."""
+        examples = {len(weights[name]) if weights[name].ndim else -1 for name in ("x", "y", "noise") if name in weights}
+        if len(examples) == 1 and min(examples) >= 0:
+            for name in ("x", "y", "noise"):
+                own: Tensor = getattr(self, name)
+                setattr(self, name, own.new_zeros(min(examples), *own.shape[1:]))
+        super().load_weights(weights)
+        if float(torch.cat([self.lengths, self.noise]).min()) <= 0.0:
+            raise ValueError("a kernel without width or noise")
+        self._solve()
+
+    def _k(self, x: Tensor) -> Tensor:
+        return kernel(x, self.x, self.camera.size, (float(self.lengths[0]), float(self.lengths[1])))
+
+    def _solve(self) -> None:
+        self._p = torch.linalg.inv(self._k(self.x) + torch.diag(self.noise.double()))
+        self._a = self._p @ self.y.double()
+        self._gains = torch.cat([torch.ones(1), self.gain])
