@@ -9,6 +9,7 @@ import msgspec
 
 from fusion.record import LapRecord, Record, ResultRecord, RunRecord, StepRecord
 from hal.errors import StorageError
+from tools.proven import proof_words
 
 PHASES = {"train": "training lap", "prove": "proving run", "unseen": "unseen layout"}
 TTY_PERIOD_S = 0.1
@@ -98,9 +99,8 @@ def lap_line(lap: LapRecord) -> str:
 
 def result_line(result: ResultRecord) -> str:
     """Say how the whole run ended."""
-    how = "converged" if result.converged else "did not converge (censored)"
     speed = f", {result.simulated_s / result.elapsed_s:.0f}x real time" if result.elapsed_s > 0 else ""
-    return f"{how} after {result.laps} training laps, {result.elapsed_s:.0f} s{speed}"
+    return f"{proof_words(result)}; {result.elapsed_s:.0f} s{speed}"
 
 
 class Display:

@@ -2,7 +2,7 @@
 
 It drives whatever robot has that name on the bus: the twin, or the real one. With --policy it only drives; on a twin,
 with --unseen, through so many layouts, and says how each went. With --method it learns: from a person with a gamepad,
-or, on a twin, from a scripted teacher until the novice drives a lap alone. What it learns goes into the --run folder:
+or, on a twin, from a scripted teacher until the novice is proven (--proof). What it learns goes into the --run folder:
 labels.lira (every label), novice.safetensors, run.jsonl.
 
 examples:
@@ -22,7 +22,7 @@ from typing import TYPE_CHECKING
 
 from fusion.tasks import TASKS, task_of
 from hal.errors import ConfigError
-from tools.arguments import natural
+from tools.arguments import add_protocol, natural
 
 if TYPE_CHECKING:
     from fusion.presets import Method
@@ -52,7 +52,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     what.add_argument(
         "--method",
-        help="learn by this method: hold or lira (LIRA-SPF), thesis, hg-dagger, ...; an unknown name lists them all",
+        help="learn by this method: plus, hold (LIRA-SPF), thesis, hg-dagger, ...; an unknown name lists them all",
     )
     add("--start", choices=("human", "experts"), help="LIRA-SPF: who drives before the first training step")
     add(
@@ -73,6 +73,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         default=12,
         help="scripted teacher: give up after so many laps (default: %(default)s)",
     )
+    add_protocol(parser)
     add(
         "--unseen",
         type=natural,
@@ -143,14 +144,20 @@ def method_of(args: argparse.Namespace) -> "Method":
 
     from fusion.lira import LiraSettings
     from fusion.presets import method_named
+    from fusion.syllabus import proofs_of
 
     method = method_named(args.method)
     if args.start is not None:
         if not isinstance(method.approach, LiraSettings):
             raise ConfigError(f"'{method.name}' takes no --start", "Only LIRA-SPF does.")
         method = msgspec.structs.replace(method, approach=msgspec.structs.replace(method.approach, start=args.start))
+    syllabus = method.syllabus
+    if args.layouts is not None:
+        syllabus = msgspec.structs.replace(syllabus, layouts=args.layouts)
+    if args.proof is not None:
+        syllabus = msgspec.structs.replace(syllabus, proofs=proofs_of(args.proof))
     learning = msgspec.structs.replace(method.learning, idle_frames=args.idle_frames)
-    return msgspec.structs.replace(method, learning=learning)
+    return msgspec.structs.replace(method, learning=learning, syllabus=syllabus)
 
 
 def publisher(robot: "RemoteRobot") -> Callable[["Decision"], None]:
