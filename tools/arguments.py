@@ -27,6 +27,6 @@ def add_protocol(parser: argparse.ArgumentParser, layouts: str | None = None, pr
         "--proof",
         metavar="own|fresh:K",
         default=proof,
-        help="what ends the teaching: the novice alone passes the lap it was just taught on (own), or K layouts in a "
-        f"row that it has never seen (default: {usual})",
+        help="what ends the teaching: the novice alone passes the lap it was just taught on (own), K layouts in a row "
+        f"that it has never seen (fresh:K), or K of N (fresh:K/N; default: {usual})",
     )

@@ -133,6 +133,7 @@ class Course:
         self._lap = partial(lap, profile, world)
         self._layout = layout
         self._syllabus = syllabus
+        self.spare = syllabus.spare
 
     def taught(self, number: int) -> list[Drive]:
         """The training lap of this number, from 1."""

@@ -25,7 +25,9 @@ def share_words(passed: int, laps: int, what: str = "unseen layouts") -> str:
 def proof_words(result: ResultRecord) -> str:
     """What the proving runs have shown."""
     kind, _, count = result.proof.partition(":")
-    what = f"{count} fresh layouts in a row" if kind == "fresh" else "the layout it was taught on"
+    passed, of, shown = count.partition("/")
+    fresh = f"{passed} of {shown} fresh layouts" if of else f"{passed} fresh layouts in a row"
+    what = fresh if kind == "fresh" else "the layout it was taught on"
     laps = f"{result.laps} training lap{'s' if result.laps != 1 else ''}"
     if result.converged:
         return f"proven after {laps}: the novice alone passed {what}"

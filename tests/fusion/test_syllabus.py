@@ -2,7 +2,7 @@
 
 import pytest
 
-from fusion.syllabus import FRESH, THESIS, Syllabus, proofs_of
+from fusion.syllabus import FRESH, THESIS, Syllabus, with_proof
 from hal.errors import ConfigError
 
 
@@ -26,15 +26,18 @@ def test_a_lap_of_ones_own_can_be_proven_on_others():
     assert 7 not in syllabus.proven(7, 2)
 
 
-def test_a_proof_is_written_and_read():
-    for syllabus in (THESIS, FRESH, Syllabus("fresh", 12)):
-        assert proofs_of(syllabus.proof) == syllabus.proofs
+@pytest.mark.parametrize("words", ["own", "fresh:3", "fresh:12", "fresh:11/12"])
+def test_a_proof_is_read_and_written(words):
+    syllabus = with_proof(FRESH, words)
+    assert syllabus.proof == words
+    assert syllabus.layouts == "fresh"
 
 
 @pytest.mark.parametrize(
-    "words", ["", "fresh", "fresh:", "fresh:0", "fresh:-1", "fresh:x", "fresh:101", "mine", "own:3"]
+    "words",
+    ["", "fresh", "fresh:0", "fresh:-1", "fresh:x", "fresh:81", "mine", "own:3", "fresh:4/3", "fresh:0/3", "fresh:3/"],
 )
 def test_what_is_no_proof_is_refused_with_an_example(words):
     with pytest.raises(ConfigError) as error:
-        proofs_of(words)
+        with_proof(THESIS, words)
     assert "fresh:3" in error.value.remedy

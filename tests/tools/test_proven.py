@@ -50,6 +50,7 @@ def test_the_proof_is_named_for_what_it_was():
     assert proof_words(result(True, 1, "fresh:3")) == (
         "proven after 1 training lap: the novice alone passed 3 fresh layouts in a row"
     )
+    assert proof_words(result(True, 2, "fresh:11/12")).endswith("passed 11 of 12 fresh layouts")
     assert proof_words(result(False, 12, "own")) == (
         "not proven within 12 training laps: the novice alone did not pass the layout it was taught on"
     )

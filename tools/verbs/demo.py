@@ -62,7 +62,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Run the demo from start to report."""
     from fusion.expert_files import SHIPPED, expert_path
-    from fusion.syllabus import proofs_of
+    from fusion.syllabus import THESIS, with_proof
     from fusion.tasks import TASKS, task_of
     from hal.profile import load_profile
     from sim_backend.catalogue import load_world
@@ -79,7 +79,7 @@ def run(args: argparse.Namespace) -> int:
     for package, extra in {**NEEDED, **(NEEDED_BY_WIRE if args.wire else {})}.items():
         if find_spec(package) is None:
             raise MissingExtraError(package, extra)
-    proofs_of(args.proof)
+    with_proof(THESIS, args.proof)
     from fusion.presets import method_named  # not sooner: it takes the learner's libraries
 
     method_named(args.method)

@@ -144,7 +144,7 @@ def method_of(args: argparse.Namespace) -> "Method":
 
     from fusion.lira import LiraSettings
     from fusion.presets import method_named
-    from fusion.syllabus import proofs_of
+    from fusion.syllabus import with_proof
 
     method = method_named(args.method)
     if args.start is not None:
@@ -155,7 +155,7 @@ def method_of(args: argparse.Namespace) -> "Method":
     if args.layouts is not None:
         syllabus = msgspec.structs.replace(syllabus, layouts=args.layouts)
     if args.proof is not None:
-        syllabus = msgspec.structs.replace(syllabus, proofs=proofs_of(args.proof))
+        syllabus = with_proof(syllabus, args.proof)
     learning = msgspec.structs.replace(method.learning, idle_frames=args.idle_frames)
     return msgspec.structs.replace(method, learning=learning, syllabus=syllabus)
 
