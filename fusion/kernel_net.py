@@ -7,15 +7,19 @@ import torch
 from numpy.typing import NDArray
 from torch import Tensor
 
-from fusion.kernel import kernel, unit
+from fusion.kernel import ANGULAR, kernel, unit
 from fusion.networks import IMAGE_PX, CameraNet, CameraTrunk, LidarNet, LidarTrunk, Network
+from fusion.preprocess import Features
+
+NEVER = 1e9  # a limit that no deviation comes to; a file holds finite numbers
 
 
 class KernelNet(Network):
     """The regression when nobody teaches it any more: both experts' trunks, the examples in use, and their solution.
 
     Its weights are the trunks' and, for n examples, `x` [n, size], `y` [n, 2] and `noise` [n], the length scales
-    [l_c, l_d], the deviations s [2] and the gain g [1], all as in `fusion/kernel.py`. n is whatever a file holds.
+    [l_c, l_d], the deviations s [2] and the gain g [1], all as in `fusion/kernel.py`; and the `limit` [1], the largest
+    deviation of a turn in the runs that proved it. n is whatever a file holds.
     """
 
     kind = "kernel"
@@ -25,12 +29,21 @@ class KernelNet(Network):
     lengths: Tensor
     scale: Tensor
     gain: Tensor
+    limit: Tensor
 
     def __init__(self, bins: int, filters: int, *, px: int = IMAGE_PX) -> None:
         super().__init__()
         self.camera, self.lidar = CameraTrunk(filters, px), LidarTrunk(bins)
         size = self.camera.size + self.lidar.size
-        shapes = {"x": (0, size), "y": (0, 2), "noise": (0,), "lengths": (2,), "scale": (2,), "gain": (1,)}
+        shapes = {
+            "x": (0, size),
+            "y": (0, 2),
+            "noise": (0,),
+            "lengths": (2,),
+            "scale": (2,),
+            "gain": (1,),
+            "limit": (1,),
+        }
         for name, shape in shapes.items():
             self.register_buffer(name, torch.ones(shape))
         self.requires_grad_(False)
@@ -58,6 +71,12 @@ class KernelNet(Network):
         k = self._k(self.features(scan, image))
         variance = 1.0 - torch.einsum("ni,ij,nj->n", k, self._p, k)
         return variance.clamp(min=0.0).sqrt()[:, None].float() * self.scale
+
+    def doubts(self, features: Features) -> bool:
+        """Whether it knows less here than anywhere in the runs that proved it."""
+        with torch.inference_mode():
+            scan, image = torch.from_numpy(features.scan)[None], torch.from_numpy(features.image)[None]
+            return bool(self.deviation(scan, image)[0, ANGULAR] > self.limit[0])
 
     def load_weights(self, weights: Mapping[str, NDArray[Any]]) -> None:
         """Put weights of any number of examples in. Raises `ValueError` where they do not fit."""

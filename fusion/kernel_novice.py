@@ -1,10 +1,12 @@
 """The novice of `fusion/kernel.py`: it learns from each label at once, and says how sure it is."""
 
+import math
+
 import torch
 from torch import Tensor
 
-from fusion.kernel import KernelRidge, KernelSettings
-from fusion.kernel_net import KernelNet
+from fusion.kernel import ANGULAR, KernelRidge, KernelSettings
+from fusion.kernel_net import NEVER, KernelNet
 from fusion.labels import Label, mirror
 from fusion.novice import LearningSettings, Novice
 from fusion.preprocess import Features
@@ -22,6 +24,7 @@ class KernelNovice(Novice):
         self._settings = settings
         self._mirrored = mirrored
         self._source, self._group = "", 0
+        self.limit = math.inf  # the largest deviation of its turn in the proving runs since the last label
         self.ridge = KernelRidge(network.camera.size + network.lidar.size, network.camera.size, settings)
 
     def act(self, features: Features) -> Action:
@@ -31,6 +34,16 @@ class KernelNovice(Novice):
     def alone(self, features: Features) -> Action:
         """m(x) with the turn times g."""
         return self.ridge.act(self._x(features), self.ridge.gain)
+
+    def proving(self, features: Features) -> Action:
+        """The same. What it meets in the runs that prove it, it knows: the measure of its doubt afterwards."""
+        _, turn = self.deviation(features)
+        self.limit = turn if math.isinf(self.limit) else max(self.limit, turn)
+        return self.alone(features)
+
+    def doubts(self, features: Features) -> bool:
+        """Whether it knows less here than anywhere in the runs that proved it; never, if it drove none."""
+        return self.deviation(features)[ANGULAR] > self.limit
 
     def deviation(self, features: Features) -> Action:
         """How far m(x) is likely to be off, as a standard deviation of each action."""
@@ -47,6 +60,7 @@ class KernelNovice(Novice):
             self.ridge.add(x, each.action, each.weight, human=human, group=self._group)
         self.stored += 1
         self.training_steps += 1
+        self.limit = math.inf
 
     def frozen(self) -> KernelNet:
         """Return the network that drives alone: without what was set aside."""
@@ -58,6 +72,7 @@ class KernelNovice(Novice):
             "lengths": torch.tensor([settings.camera_length, settings.lidar_length]).numpy(),
             "scale": self.ridge.fit.scale.float().numpy(),
             "gain": torch.tensor([self.ridge.gain]).numpy(),
+            "limit": torch.tensor([min(self.limit, NEVER)]).numpy(),
         }
         network = KernelNet(self._network.lidar.bins, self._network.camera.filters, px=self._network.camera.px)
         network.load_weights(weights)

@@ -81,6 +81,10 @@ class Novice(ABC):
         """What it does when nobody teaches it any more: the same, unless a novice knows how it errs."""
         return self.act(features)
 
+    def proving(self, features: Features) -> Action:
+        """The same in a run that proves it, from which it may learn what it knows."""
+        return self.alone(features)
+
     def deviation(self, features: Features) -> Action | None:  # noqa: ARG002
         """How far off a^N is likely to be, as a standard deviation of each action; None: it cannot tell."""
         return None

@@ -12,6 +12,7 @@ Its novice is that of `fusion/kernel.py`.
 from collections import deque
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from typing import Literal
 
 from fusion.lira import LiraSettings, LiraSpf, choose
 from fusion.method import Call, Choice, Expert, Lesson, Policy, Proposal, Settled
@@ -29,6 +30,7 @@ class PlusSettings(Table, frozen=True, tag="plus"):
     reserve_s: float = 1.0  # an expert's label waits so long for the human's objection
     wheel_s: float = 1.0  # an expert that was given the wheel keeps it so long
     sure: float | None = None  # standard deviation of its turn below which the novice knows
+    ask: tuple[Literal["prove", "unseen"], ...] = ()  # runs in which it stops and asks where it doubts
 
 
 class LiraPlus(LiraSpf):

@@ -10,9 +10,8 @@ import msgspec
 
 from fusion.control import ControlLoop
 from fusion.demonstrations import DemonstrationLog
-from fusion.experts import load_expert
+from fusion.experts import load_alone
 from fusion.journal import Journal
-from fusion.method import Alone
 from fusion.presets import Method
 from fusion.record import Record, RunWriter
 from fusion.session import Session
@@ -71,10 +70,10 @@ def teach(args: argparse.Namespace, method: Method, robot: RemoteRobot, publish:
 def examine(args: argparse.Namespace, robot: RemoteRobot, publish: Publish, say: Say) -> int:
     """Let a policy drive the layouts after `args.layout`; it goes on behind a crash. Returns 1 if any failed."""
     with arena_of(args, robot) as (arena, world):
-        policy = load_expert(args.policy, robot.profile, args.experts or task_of(world.name))
+        policy = load_alone(args.policy, robot.profile, args.experts or task_of(world.name), ask=args.ask)
         journal = Journal(write=telling(say), publish=publish)
         loop = ControlLoop(robot, truth=arena.state)
-        session = Session(robot, arena, loop, journal, None, lambda _: Alone(policy.name, policy.act))
+        session = Session(robot, arena, loop, journal, None, lambda _: policy)
         loop.arm()
         course = Course(robot.profile, world, args.layout, THESIS)
         laps = session.show(course.unseen(args.layout + 1, args.unseen))

@@ -64,11 +64,19 @@ def crew(
         rule = Switching(camera, lidar, approach, profile.features.max_range_m)
         return Crew(None, lambda _: rule)
     pupil = apprentice(method, profile, seed, trainer, pair)
-    novice = Alone("novice", pupil.novice.alone)
-    if isinstance(pupil, HgDagger) and isinstance(approach, HgDaggerSettings) and pupil.log is not None:
-        doubtful = Doubtful(pupil.novice.act, pupil.log)
-        return Crew(pupil, lambda phase: doubtful if phase in approach.doubt else novice, "unseen" in approach.doubt)
-    return Crew(pupil, lambda _: novice)
+    doubtful: Doubtful | None = None
+    asks: tuple[str, ...] = ()
+    match pupil, approach:
+        case HgDagger(log=DoubtLog() as log), HgDaggerSettings():
+            doubtful, asks = Doubtful(pupil.novice.alone, log.exceeds), approach.doubt
+        case LiraPlus(novice=KernelNovice() as novice), PlusSettings():
+            doubtful, asks = Doubtful(novice.alone, novice.doubts), approach.ask
+    frozen = {"prove": Alone("novice", pupil.novice.proving), "unseen": Alone("novice", pupil.novice.alone)}
+    return Crew(
+        pupil,
+        lambda phase: doubtful if doubtful is not None and phase in asks else frozen[phase],
+        answered="unseen" in asks,
+    )
 
 
 def apprentice(

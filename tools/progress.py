@@ -91,6 +91,8 @@ def lap_line(lap: LapRecord) -> str:
     name = f"{PHASES.get(lap.phase, lap.phase)} {number}"
     words = f"{name:<16} {'passed' if lap.passed else 'failed'} {lap.duration_s:6.1f} s"
     words += f"  collisions {lap.collisions}, lost {lap.lost}"
+    if lap.stops:
+        words += f", stops to ask {lap.stops}"
     if lap.phase == "train":
         words += f"  human labels {lap.human_labels}, interventions {lap.interventions}, calls {lap.calls},"
         words += f" buffer {lap.buffer}, training steps {lap.training_steps}"

@@ -99,6 +99,34 @@ def test_alone_it_turns_more_than_while_it_is_taught():
     assert abs(alone[1]) > abs(angular)
 
 
+class TestDoubt:
+    FAR = Features(np.zeros(BINS, np.float32), np.eye(32, dtype=np.float32))
+
+    def proven(self):
+        learner = taught(12)
+        for i in range(4):
+            learner.proving(seen(i))
+        return learner
+
+    def test_it_doubts_where_it_knows_less_than_anywhere_it_was_proven(self):
+        learner = self.proven()
+        assert not any(learner.doubts(seen(i)) for i in range(4))
+        assert learner.doubts(self.FAR)
+        assert learner.frozen().doubts(self.FAR)
+        assert not learner.frozen().doubts(seen(0))
+
+    def test_before_it_was_proven_and_after_another_label_it_has_no_measure_of_doubt(self):
+        assert not taught().doubts(self.FAR)
+        assert not taught().frozen().doubts(self.FAR)
+        learner = self.proven()
+        learner.remember(Label(seen(50).scan, seen(50).image, (1.0, 0.5), "human"))
+        assert not learner.doubts(self.FAR)
+
+    def test_what_it_does_does_not_depend_on_being_watched(self):
+        learner = taught()
+        assert learner.proving(seen(3)) == learner.alone(seen(3))
+
+
 class TestFile:
     def saved(self, tmp_path, network):
         path = tmp_path / "novice.safetensors"

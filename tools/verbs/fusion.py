@@ -9,7 +9,8 @@ examples:
   lira fusion --policy camera-expert                   let one expert drive
   lira fusion --policy runs/demo-1/novice.safetensors  let a trained novice drive
   lira fusion --policy runs/demo-1/novice.safetensors --layout 100 --unseen 3   through layouts 101 to 103 of a twin
-  lira fusion --method lira --run runs/mine            learn from a person
+  lira fusion --policy runs/demo-1/novice.safetensors --ask    which stops and calls where it does not know
+  lira fusion --method plus --run runs/mine            learn from a person
   lira fusion --method lira --teacher scripted --run runs/taught
   lira fusion --method lira --experts corridor         in a real corridor
 """
@@ -44,6 +45,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     what = parser.add_mutually_exclusive_group(required=True)
     what.add_argument("--policy", help="drive only: camera-expert, lidar-expert or a .safetensors file")
+    add(
+        "--ask",
+        action="store_true",
+        help="with --policy: a novice of plus stands and calls where it knows less than in the runs that proved it",
+    )
     add(
         "--experts",
         metavar="PAIR",
@@ -95,6 +101,8 @@ def run(args: argparse.Namespace) -> int:
 
     if args.method is not None and method_of(args).kind == "switching" and args.teacher == "none":
         raise ConfigError(f"by the method '{args.method}' nobody learns", "Show it on a twin with --teacher perfect.")
+    if args.ask and args.policy is None:
+        raise ConfigError("--ask is for a policy that drives", "Give one with --policy, or leave --ask out.")
     torch.set_num_threads(1)  # the nets are small; and a result should not depend on the number of cores
     signal.signal(signal.SIGTERM, signal.default_int_handler)
     bus = Bus(args.name, connect=args.connect)
