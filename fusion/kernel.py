@@ -49,7 +49,7 @@ class KernelSettings(Table, frozen=True):
     noise: float = 0.1  # variance of a label of weight 1
     contradicts: float | None = 1.2  # residual of the turn that sets a label aside; None: none is
     gain: float | None = None
-    most: int = 1000
+    most: int = 800
 
 
 def unit(features: Tensor, camera_size: int) -> Tensor:
@@ -164,7 +164,7 @@ class KernelRidge:
             used = torch.ones(len(self), dtype=torch.bool)
             p = self._p.clone()
             while (worst := self._contradiction(p, used)) is not None:
-                p = without(p, worst)
+                leave_out(p, worst)
                 used[worst] = False
             self._fit = Fit(p, self.y, used, self.human, self.groups)
         return self._fit
@@ -196,14 +196,17 @@ class KernelRidge:
             residual = residual.where(~self.human, torch.inf)
         gone = int(residual.argmin())
         stay = torch.arange(len(self)) != gone
-        self._p = without(self._p, gone)[stay][:, stay]
+        leave_out(self._p, gone)
+        self._p = self._p[stay][:, stay]
         self.x, self.y, self.w = self.x[stay], self.y[stay], self.w[stay]
         self.human, self.groups = self.human[stay], self.groups[stay]
 
 
-def without(p: Tensor, i: int) -> Tensor:
-    """P of all examples but i, whose row and column become zero."""
-    return p - torch.outer(p[i], p[i]) / p[i, i]
+def leave_out(p: Tensor, i: int) -> None:
+    """Turn P, in place, into that of all examples but i, whose row and column become zero."""
+    row = p[i].clone()
+    p.addr_(row, row, alpha=-1.0 / float(row[i]))
+    p[i], p[:, i] = 0.0, 0.0
 
 
 def clipped(value: float) -> float:
