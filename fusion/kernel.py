@@ -130,6 +130,7 @@ class KernelRidge:
         self.w = torch.empty(0, dtype=torch.float64)
         self.human = torch.empty(0, dtype=torch.bool)
         self.groups = torch.empty(0, dtype=torch.int64)
+        self.labels = torch.empty(0, dtype=torch.int64)  # which label each is an example of
         self._p = torch.empty(0, 0, dtype=torch.float64)
         self._fit: Fit | None = None
 
@@ -141,8 +142,10 @@ class KernelRidge:
         lengths = self._settings.camera_length, self._settings.lidar_length
         return kernel(self.x, x[None], self._camera_size, lengths)[:, 0]
 
-    def add(self, x: Tensor, action: tuple[float, float], weight: float, *, human: bool, group: int) -> None:
-        """Append one example x [size]: P is bordered (Schur complement). Where there are too many one has to go."""
+    def add(
+        self, x: Tensor, action: tuple[float, float], weight: float, *, human: bool, group: int, label: int
+    ) -> None:
+        """Append one example x [size] of a label: P is bordered (Schur complement). One has to go if there are too many."""
         k = self.k(x)
         pk = self._p @ k
         schur = 1.0 + self._settings.noise / weight - k @ pk
@@ -153,6 +156,7 @@ class KernelRidge:
         self.w = torch.cat([self.w, torch.tensor([weight], dtype=torch.float64)])
         self.human = torch.cat([self.human, torch.tensor([human])])
         self.groups = torch.cat([self.groups, torch.tensor([group])])
+        self.labels = torch.cat([self.labels, torch.tensor([label])])
         self._fit = None
         if len(self) > self._settings.most:
             self._forget()
@@ -168,6 +172,11 @@ class KernelRidge:
                 used[worst] = False
             self._fit = Fit(p, self.y, used, self.human, self.groups)
         return self._fit
+
+    @property
+    def aside(self) -> list[int]:
+        """The labels of which an example is set aside."""
+        return sorted(set(self.labels[~self.fit.used].tolist()))
 
     def act(self, x: Tensor, gain: float = 1.0) -> tuple[float, float]:
         """m(x), the turn times `gain`, clipped."""
@@ -199,7 +208,7 @@ class KernelRidge:
         leave_out(self._p, gone)
         self._p = self._p[stay][:, stay]
         self.x, self.y, self.w = self.x[stay], self.y[stay], self.w[stay]
-        self.human, self.groups = self.human[stay], self.groups[stay]
+        self.human, self.groups, self.labels = self.human[stay], self.groups[stay], self.labels[stay]
 
 
 def leave_out(p: Tensor, i: int) -> None:

@@ -23,7 +23,8 @@ class KernelNovice(Novice):
         self._network = network
         self._settings = settings
         self._mirrored = mirrored
-        self._source, self._group = "", 0
+        self._sources: list[str] = []
+        self._group = 0
         self.limit = math.inf  # the largest deviation of its turn in the proving runs since the last label
         self.ridge = KernelRidge(network.camera.size + network.lidar.size, network.camera.size, settings)
 
@@ -52,15 +53,20 @@ class KernelNovice(Novice):
 
     def remember(self, label: Label) -> None:
         """Learn a label. What one source shows in a row is a group: its labels say little about each other's worth."""
-        if label.source != self._source:
-            self._source, self._group = label.source, self._group + 1
+        if self._sources[-1:] != [label.source]:
+            self._group += 1
         human = label.source == "human"
         for each in (label, mirror(label)) if self._mirrored else (label,):
             x = self._x(Features(each.scan, each.image))
-            self.ridge.add(x, each.action, each.weight, human=human, group=self._group)
+            self.ridge.add(x, each.action, each.weight, human=human, group=self._group, label=self.stored)
+        self._sources.append(label.source)
         self.stored += 1
         self.training_steps += 1
         self.limit = math.inf
+
+    def set_aside(self) -> list[tuple[int, str]]:
+        """Number, in the order in which they were stored, and source of the labels that contradict the rest."""
+        return [(number, self._sources[number]) for number in self.ridge.aside]
 
     def frozen(self) -> KernelNet:
         """Return the network that drives alone: without what was set aside."""

@@ -97,6 +97,10 @@ class Novice(ABC):
     def frozen(self) -> Network:
         """Return a copy of the policy as it drives alone, to be saved."""
 
+    def set_aside(self) -> list[tuple[int, str]]:
+        """Number and source of the labels it does not believe; none, unless a novice can tell."""
+        return []
+
     def learn(self, features: Features, action: Action, source: str, a_n: Action) -> bool:
         """Store a label unless it is redundant; `a_n` is the novice's own action there. Returns whether it was kept."""
         threshold = self.settings.redundancy * self.settings.action_range

@@ -3,7 +3,8 @@
 import argparse
 import shlex
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from dataclasses import replace
 from pathlib import Path
 
 from fusion.checkpoint import Checkpoint, save_checkpoint
@@ -46,17 +47,27 @@ def snapshot(
     `sync` makes sure of the labels. The writing raises `StorageError`.
     """
     labels, steps, network = novice.stored, novice.training_steps, novice.frozen()
+    doubtful = aside_words(novice.set_aside())
     sizes = profile.features.bins, profile.features.filters
     about = Checkpoint(network.kind, *sizes, profile.name, None, command(args), args.seed)
+    about = replace(about, labels=labels, training_steps=steps)
 
     def write() -> str:
         sync()
         if steps == 0:
             return f"saved {labels} labels in {folder}; there is no novice yet"
         save_checkpoint(folder / NOVICE, network, about)
-        return f"saved {labels} labels and the novice after {steps} training steps in {folder}"
+        return f"saved {labels} labels and the novice after {steps} training steps in {folder}{doubtful}"
 
     return write
+
+
+def aside_words(labels: Sequence[tuple[int, str]]) -> str:
+    """Which labels the novice does not believe, for whoever gave them to look at."""
+    if not labels:
+        return ""
+    names = ", ".join(f"{number} ({source})" for number, source in labels)
+    return f"; set aside, since the others contradict them, labels {names}"
 
 
 def command(args: argparse.Namespace) -> str:

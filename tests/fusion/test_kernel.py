@@ -29,6 +29,7 @@ def taught(x, actions, settings=PLAIN, *, human=None, groups=None, weights=None)
             1.0 if weights is None else weights[i],
             human=True if human is None else human[i],
             group=i if groups is None else groups[i],
+            label=i,
         )
     return ridge
 
@@ -129,7 +130,7 @@ class TestSettingAside:
     def test_a_label_that_contradicts_all_others_leaves_the_fit_and_is_kept(self):
         ridge, x = self.scene(human=[True] * 13)
         assert ridge.fit.used.tolist() == [True] * 12 + [False]
-        assert len(ridge) == 13
+        assert (len(ridge), ridge.aside) == (13, [12])
         plain = taught(x[:12], [(1.0, 0.9)] * 12)
         assert ridge.act(x[12]) == pytest.approx(plain.act(x[12]), abs=1e-6)
 
@@ -163,6 +164,7 @@ def test_where_there_are_too_many_the_expert_s_label_goes_that_the_others_say_be
     human = [False, False, False, False, True, True, False, True]
     ridge = taught(x, labels, KernelSettings(contradicts=None, most=6), human=human)
     assert len(ridge) == 6
+    assert [i for i in range(8) if any(torch.equal(x[i], row) for row in ridge.x)] == ridge.labels.tolist()
     assert ridge.human.tolist().count(True) == 3
     left = [i for i in range(8) if any(torch.equal(x[i], row) for row in ridge.x)]
     whole = taught(x[left], [labels[i] for i in left])

@@ -1,5 +1,7 @@
 """The novice that learns from each label at once, and the file that drives without it."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 import torch
@@ -13,6 +15,7 @@ from fusion.networks import CameraNet, LidarNet
 from fusion.novice import LearningSettings
 from fusion.preprocess import Features
 from hal.errors import StorageError
+from tools.run_folder import aside_words
 
 BINS, FILTERS = 21, 4
 
@@ -69,6 +72,17 @@ def test_what_one_source_shows_in_a_row_is_a_group():
     for i, source in enumerate(["camera", "camera", "human", "human", "camera"]):
         learner.remember(Label(seen(i).scan, seen(i).image, (1.0, 0.0), source))
     assert learner.ridge.groups.tolist() == [1, 1, 1, 1, 2, 2, 2, 2, 3, 3]
+
+
+def test_a_label_that_all_others_contradict_is_named_with_who_gave_it():
+    learner = novice(mirrored=False)
+    label = Label(seen(0).scan, seen(0).image, (1.0, 0.9), "human")
+    for _ in range(5):
+        learner.remember(label)
+    learner.remember(replace(label, action=(1.0, -0.9), source="camera"))
+    assert learner.set_aside() == [(5, "camera")]
+    assert aside_words(learner.set_aside()).endswith("labels 5 (camera)")
+    assert aside_words(novice().set_aside()) == ""
 
 
 def test_it_is_less_sure_where_it_has_seen_nothing_like_it():
