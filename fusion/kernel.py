@@ -145,7 +145,7 @@ class KernelRidge:
     def add(
         self, x: Tensor, action: tuple[float, float], weight: float, *, human: bool, group: int, label: int
     ) -> None:
-        """Append one example x [size] of a label: P is bordered (Schur complement). One has to go if there are too many."""
+        """Append one example x [size] of a label: P is bordered (Schur complement). Of too many, one has to go."""
         k = self.k(x)
         pk = self._p @ k
         schur = 1.0 + self._settings.noise / weight - k @ pk
