@@ -20,6 +20,9 @@ Two things are set by what was left out, one group (an intervention, or what an 
     g            what the turns of the human's labels are larger than predicted, in root mean square: the mean of full
                  steer to either side is too small a turn, and a robot that drives alone makes up for it
 
+A state is *known* if sd of the turn there is below what it was, the intervention itself left out, at all but a share of
+the human's labels: it is unlike the states in which the human found that it had to be told (a conformal threshold).
+
 Labels that contradict the others are *set aside*, not deleted: while a residual of the turn exceeds `contradicts`, the
 worst one leaves the fit, an expert's before a human's.
 
@@ -70,6 +73,7 @@ class Fit:
 
     p: Tensor
     y: Tensor
+    noise: Tensor  # the diagonal of N [n]
     used: Tensor  # bool [n]
     human: Tensor  # bool [n]
     groups: Tensor  # int64 [n]
@@ -116,6 +120,17 @@ class Fit:
         low, high = GAINS
         small, large = float(predicted.square().sum()), float(turns.square().sum())
         return low if small == 0.0 else min(high, max(low, (large / small) ** 0.5))
+
+    def surprise(self, share: float) -> float:
+        """The deviation of the turn, as the other groups predict it, below which that share of the human's labels lie.
+
+        0 where no human has labelled anything.
+        """
+        shown = self.used & self.human
+        if not shown.any():
+            return 0.0
+        variance = (self.left_out[1] - self.noise)[shown].clamp(min=0.0)
+        return float(self.scale[ANGULAR] * variance.quantile(share).sqrt())
 
 
 class KernelRidge:
@@ -170,7 +185,7 @@ class KernelRidge:
             while (worst := self._contradiction(p, used)) is not None:
                 leave_out(p, worst)
                 used[worst] = False
-            self._fit = Fit(p, self.y, used, self.human, self.groups)
+            self._fit = Fit(p, self.y, self._settings.noise / self.w, used, self.human, self.groups)
         return self._fit
 
     @property

@@ -51,6 +51,10 @@ class KernelNovice(Novice):
         linear, angular = self.ridge.fit.deviation(self.ridge.k(self._x(features))).tolist()
         return linear, angular
 
+    def knows(self, features: Features, share: float) -> bool:
+        """Whether it is surer of its turn than it was at all but that share of the human's labels before they came."""
+        return self.deviation(features)[ANGULAR] < self.ridge.fit.surprise(share)
+
     def remember(self, label: Label) -> None:
         """Learn a label. What one source shows in a row is a group: its labels say little about each other's worth."""
         if self._sources[-1:] != [label.source]:

@@ -85,9 +85,11 @@ class Novice(ABC):
         """The same in a run that proves it, from which it may learn what it knows."""
         return self.alone(features)
 
-    def deviation(self, features: Features) -> Action | None:  # noqa: ARG002
-        """How far off a^N is likely to be, as a standard deviation of each action; None: it cannot tell."""
-        return None
+    def knows(self, features: Features, share: float) -> bool:  # noqa: ARG002
+        """Whether it is surer here than it was at all but that share of what a human had to show it; never if it
+        cannot tell.
+        """
+        return False
 
     @abstractmethod
     def remember(self, label: Label) -> None:

@@ -29,7 +29,7 @@ class PlusSettings(Table, frozen=True, tag="plus"):
     prefill: int = 60  # labels the experts give before the human is asked
     reserve_s: float = 1.0  # an expert's label waits so long for the human's objection
     wheel_s: float = 1.0  # an expert that was given the wheel keeps it so long
-    sure: float | None = None  # standard deviation of its turn below which the novice knows
+    sure: float | None = None  # surer than at all but this share of what the human showed, the novice is not helped
     ask: tuple[Literal["prove", "unseen"], ...] = ()  # runs in which it stops and asks where it doubts
 
 
@@ -109,5 +109,4 @@ class LiraPlus(LiraSpf):
 
     def _sure(self, features: Features) -> bool:
         """Whether the novice knows what to do here."""
-        deviation = self.novice.deviation(features)
-        return self._plus.sure is not None and deviation is not None and deviation[1] < self._plus.sure
+        return self._plus.sure is not None and self.novice.knows(features, self._plus.sure)

@@ -113,6 +113,16 @@ def test_alone_it_turns_more_than_while_it_is_taught():
     assert abs(alone[1]) > abs(angular)
 
 
+def test_it_knows_what_is_unlike_what_the_human_had_to_show_it():
+    learner = novice(mirrored=False)
+    assert not learner.knows(seen(0), 0.25)  # before any human
+    for i, source in enumerate(["camera", "camera", "camera", "human", "camera", "human"]):
+        at = seen(0) if source == "camera" else seen(i)
+        learner.remember(Label(at.scan, at.image, (1.0, 0.1 * i), source))
+    assert learner.knows(seen(0), 0.25)  # three times the same, and no human
+    assert not learner.knows(TestDoubt.FAR, 0.25)
+
+
 class TestDoubt:
     FAR = Features(np.zeros(BINS, np.float32), np.eye(32, dtype=np.float32))
 

@@ -211,10 +211,10 @@ def test_the_human_s_labels_weigh_more():
     assert [(label.source, label.weight) for label in scene.shelf.labels] == [("camera", 1.0), ("human", 3.0)]
 
 
-@pytest.mark.parametrize(("turn", "call"), [(0.1, Call.NONE), (0.3, Call.FEEDBACK)])
-def test_where_the_experts_disagree_nobody_is_called_if_the_novice_knows(turn, call):
-    scene = Scene(PlusSettings(prefill=0, reserve_s=0.0, wheel_s=0.0, sure=0.2))
-    scene.novice.deviation = lambda _: (0.5, turn)
+@pytest.mark.parametrize(("knows", "call"), [(True, Call.NONE), (False, Call.FEEDBACK)])
+def test_where_the_experts_disagree_nobody_is_called_if_the_novice_knows(knows, call):
+    scene = Scene(PlusSettings(prefill=0, reserve_s=0.0, wheel_s=0.0, sure=0.25))
+    scene.novice.knows = lambda _, share: knows and share == 0.25
     scene.warm()
     scene.camera, scene.lidar = LEFT, RIGHT
     proposal, lesson = scene.step()
@@ -224,7 +224,7 @@ def test_where_the_experts_disagree_nobody_is_called_if_the_novice_knows(turn, c
 
 
 def test_a_novice_that_cannot_tell_is_never_sure():
-    scene = Scene(PlusSettings(prefill=0, reserve_s=0.0, wheel_s=0.0, sure=1e9))
+    scene = Scene(PlusSettings(prefill=0, reserve_s=0.0, wheel_s=0.0, sure=1.0))
     scene.warm()
     scene.camera, scene.lidar = LEFT, RIGHT
     assert scene.step()[0].choice.call is Call.FEEDBACK
