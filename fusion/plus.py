@@ -12,7 +12,6 @@ Its novice is that of `fusion/kernel.py`.
 from collections import deque
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from typing import Literal
 
 from fusion.lira import LiraSettings, LiraSpf, choose
 from fusion.method import Call, Choice, Expert, Lesson, Policy, Proposal, Settled
@@ -30,7 +29,7 @@ class PlusSettings(Table, frozen=True, tag="plus"):
     reserve_s: float = 1.0  # an expert's label waits so long for the human's objection
     wheel_s: float = 1.0  # an expert that was given the wheel keeps it so long
     sure: float | None = None  # surer than at all but this share of what the human showed, the novice is not helped
-    ask: tuple[Literal["prove", "unseen"], ...] = ()  # runs in which it stops and asks where it doubts
+    ask: bool = False  # on unseen layouts it stops and asks where it doubts
 
 
 class LiraPlus(LiraSpf):

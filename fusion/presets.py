@@ -83,7 +83,7 @@ METHODS = {
         _plus("plus-no-gain", kernel=KernelSettings(gain=1.0)),
         _plus("plus-network", kernel=None),
         _plus("plus-sure", approach=PlusSettings(sure=0.25)),
-        _plus("plus-ask", approach=PlusSettings(ask=("unseen",))),
+        _plus("plus-ask", approach=PlusSettings(ask=True)),
         _plus("plus-own", syllabus=THESIS),
         Method("hg-dagger", _HG, trunks="scratch"),
         Method("hg-dagger-m10", _HG, _M10, trunks="scratch"),

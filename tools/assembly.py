@@ -70,7 +70,7 @@ def crew(
         case HgDagger(log=DoubtLog() as log), HgDaggerSettings():
             doubtful, asks = Doubtful(pupil.novice.alone, log.exceeds), approach.doubt
         case LiraPlus(novice=KernelNovice() as novice), PlusSettings():
-            doubtful, asks = Doubtful(novice.alone, novice.doubts), approach.ask
+            doubtful, asks = Doubtful(novice.alone, novice.doubts), ("unseen",) if approach.ask else ()
     frozen = {"prove": Alone("novice", pupil.novice.proving), "unseen": Alone("novice", pupil.novice.alone)}
     return Crew(
         pupil,
