@@ -14,6 +14,7 @@ from fusion.kernel_net import KernelNet
 from fusion.networks import IMAGE_PX, CameraNet, FusionNet, Kind, LidarNet, Network
 from hal.errors import StorageError
 
+MOST_EXAMPLES = 4096
 _KEY = "lira"  # the one metadata entry, JSON
 
 
@@ -24,6 +25,7 @@ class Checkpoint:
     `cruise` is an expert's measured action (linear, angular) on an empty straight course; `provenance` the command
     that made it. `bins`, `filters` and `px` are the sizes of the sensors' trunks, also for the one that is not used.
     `labels` and `training_steps` are what it took; None for a file that was written before they were counted.
+    `examples` is how many a kernel drives by; a network drives by none, and its file does not speak of them.
     """
 
     kind: Kind
@@ -36,11 +38,13 @@ class Checkpoint:
     px: int = IMAGE_PX
     labels: int | None = None
     training_steps: int | None = None
+    examples: int = 0
 
 
 def save_checkpoint(path: Path, network: Network, checkpoint: Checkpoint) -> None:
     """Write a checkpoint whole or not at all. Raises `StorageError`."""
-    metadata = {_KEY: json.dumps(asdict(checkpoint))}
+    about = {name: value for name, value in asdict(checkpoint).items() if name != "examples" or value}
+    metadata = {_KEY: json.dumps(about)}
     data = save(network.weights(), metadata)
     draft = path.with_name(f"{path.name}.{os.getpid()}.tmp")
     try:
@@ -88,10 +92,12 @@ def build(checkpoint: Checkpoint) -> Network:
         < 4096
     ):
         raise ValueError(f"a network of {checkpoint.bins} bins and {checkpoint.filters} filters")
+    if not 0 <= checkpoint.examples <= MOST_EXAMPLES:
+        raise ValueError(f"a kernel of {checkpoint.examples} examples")
     if checkpoint.kind == "camera":
         return CameraNet(checkpoint.filters, px=checkpoint.px, seed=checkpoint.seed)
     if checkpoint.kind == "lidar":
         return LidarNet(checkpoint.bins, seed=checkpoint.seed)
     if checkpoint.kind == "kernel":
-        return KernelNet(checkpoint.bins, checkpoint.filters, px=checkpoint.px)
+        return KernelNet(checkpoint.bins, checkpoint.filters, px=checkpoint.px, examples=checkpoint.examples)
     return FusionNet(checkpoint.bins, checkpoint.filters, px=checkpoint.px, seed=checkpoint.seed)

@@ -19,7 +19,7 @@ class KernelNet(Network):
 
     Its weights are the trunks' and, for n examples, `x` [n, size], `y` [n, 2] and `noise` [n], the length scales
     [l_c, l_d], the deviations s [2] and the gain g [1], all as in `fusion/kernel.py`; and the `limit` [1], the largest
-    deviation of a turn in the runs that proved it. n is whatever a file holds.
+    deviation of a turn in the runs that proved it.
     """
 
     kind = "kernel"
@@ -31,23 +31,15 @@ class KernelNet(Network):
     gain: Tensor
     limit: Tensor
 
-    def __init__(self, bins: int, filters: int, *, px: int = IMAGE_PX) -> None:
+    def __init__(self, bins: int, filters: int, *, px: int = IMAGE_PX, examples: int = 0) -> None:
         super().__init__()
         self.camera, self.lidar = CameraTrunk(filters, px), LidarTrunk(bins)
         size = self.camera.size + self.lidar.size
-        shapes = {
-            "x": (0, size),
-            "y": (0, 2),
-            "noise": (0,),
-            "lengths": (2,),
-            "scale": (2,),
-            "gain": (1,),
-            "limit": (1,),
-        }
-        for name, shape in shapes.items():
+        shapes = {"x": (examples, size), "y": (examples, 2), "noise": (examples,)}
+        for name, shape in {**shapes, "lengths": (2,), "scale": (2,), "gain": (1,), "limit": (1,)}.items():
             self.register_buffer(name, torch.ones(shape))
         self.requires_grad_(False)
-        self._solve()
+        self._solution: tuple[Tensor, Tensor] | None = None
 
     @classmethod
     def from_experts(cls, camera: CameraNet, lidar: LidarNet) -> "KernelNet":
@@ -63,13 +55,14 @@ class KernelNet(Network):
 
     def head(self, features: Tensor) -> Tensor:
         """m(x), the turn times g, clipped."""
-        actions: Tensor = (self._k(features) @ self._a).float() * self._gains
+        _, a = self._solve()
+        actions = (self._k(features) @ a).float() * torch.cat([torch.ones(1), self.gain])
         return actions.clamp(-1.0, 1.0)
 
     def deviation(self, scan: Tensor, image: Tensor) -> Tensor:
         """sd(x) [n, 2] of the mean's two actions."""
-        k = self._k(self.features(scan, image))
-        variance = 1.0 - torch.einsum("ni,ij,nj->n", k, self._p, k)
+        k, (p, _) = self._k(self.features(scan, image)), self._solve()
+        variance = 1.0 - torch.einsum("ni,ij,nj->n", k, p, k)
         return variance.clamp(min=0.0).sqrt()[:, None].float() * self.scale
 
     def doubts(self, features: Features) -> bool:
@@ -78,22 +71,24 @@ class KernelNet(Network):
             scan, image = torch.from_numpy(features.scan)[None], torch.from_numpy(features.image)[None]
             return bool(self.deviation(scan, image)[0, ANGULAR] > self.limit[0])
 
+    @property
+    def examples(self) -> int:
+        """n."""
+        return len(self.x)
+
     def load_weights(self, weights: Mapping[str, NDArray[Any]]) -> None:
-        """Put weights of any number of examples in. Raises `ValueError` where they do not fit."""
-        examples = {len(weights[name]) if weights[name].ndim else -1 for name in ("x", "y", "noise") if name in weights}
-        if len(examples) == 1 and min(examples) >= 0:
-            for name in ("x", "y", "noise"):
-                own: Tensor = getattr(self, name)
-                setattr(self, name, own.new_zeros(min(examples), *own.shape[1:]))
+        """Put weights in. Raises `ValueError` where they do not fit."""
         super().load_weights(weights)
+        self._solution = None
         if float(torch.cat([self.lengths, self.noise]).min()) <= 0.0:
             raise ValueError("a kernel without width or noise")
-        self._solve()
 
     def _k(self, x: Tensor) -> Tensor:
         return kernel(x, self.x, self.camera.size, (float(self.lengths[0]), float(self.lengths[1])))
 
-    def _solve(self) -> None:
-        self._p = torch.linalg.inv(self._k(self.x) + torch.diag(self.noise.double()))
-        self._a = self._p @ self.y.double()
-        self._gains = torch.cat([torch.ones(1), self.gain])
+    def _solve(self) -> tuple[Tensor, Tensor]:
+        """P and A."""
+        if self._solution is None:
+            p = torch.linalg.inv(self._k(self.x) + torch.diag(self.noise.double()))
+            self._solution = p, p @ self.y.double()
+        return self._solution

@@ -84,7 +84,8 @@ class KernelNovice(Novice):
             "gain": torch.tensor([self.ridge.gain]).numpy(),
             "limit": torch.tensor([min(self.limit, NEVER)]).numpy(),
         }
-        network = KernelNet(self._network.lidar.bins, self._network.camera.filters, px=self._network.camera.px)
+        camera, bins = self._network.camera, self._network.lidar.bins
+        network = KernelNet(bins, camera.filters, px=camera.px, examples=int(used.sum()))
         network.load_weights(weights)
         return network
 

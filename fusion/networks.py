@@ -69,6 +69,11 @@ class Network(nn.Module, ABC):
 
     kind: ClassVar[Kind]
 
+    @property
+    def examples(self) -> int:
+        """How many labels it drives by; 0 for one that has only been trained on them."""
+        return 0
+
     @abstractmethod
     def features(self, scan: Tensor, image: Tensor, /) -> Tensor:
         """Scan float32 [n, bins] and image float32 [n, px, px] -> trunk output [n, size]."""

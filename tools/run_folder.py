@@ -50,7 +50,7 @@ def snapshot(
     doubtful = aside_words(novice.set_aside())
     sizes = profile.features.bins, profile.features.filters
     about = Checkpoint(network.kind, *sizes, profile.name, None, command(args), args.seed)
-    about = replace(about, labels=labels, training_steps=steps)
+    about = replace(about, labels=labels, training_steps=steps, examples=network.examples)
 
     def write() -> str:
         sync()

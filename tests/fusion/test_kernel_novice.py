@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import torch
 
-from fusion.checkpoint import Checkpoint, load_checkpoint, save_checkpoint
+from fusion.checkpoint import Checkpoint, build, load_checkpoint, save_checkpoint
 from fusion.kernel import KernelSettings
 from fusion.kernel_net import KernelNet
 from fusion.kernel_novice import KernelNovice
@@ -154,7 +154,8 @@ class TestDoubt:
 class TestFile:
     def saved(self, tmp_path, network):
         path = tmp_path / "novice.safetensors"
-        save_checkpoint(path, network, Checkpoint(network.kind, BINS, FILTERS, "thesis-sim", None, "lira demo", 0))
+        about = Checkpoint(network.kind, BINS, FILTERS, "thesis-sim", None, "lira demo", 0, examples=network.examples)
+        save_checkpoint(path, network, about)
         return path
 
     def test_it_goes_to_a_file_and_comes_back_with_all_it_was_taught(self, tmp_path):
@@ -162,6 +163,11 @@ class TestFile:
         back, about = load_checkpoint(self.saved(tmp_path, network))
         assert about.kind == "kernel"
         assert back.act(seen(3).scan, seen(3).image) == network.act(seen(3).scan, seen(3).image)
+
+    @pytest.mark.parametrize("examples", [-1, 10**9])
+    def test_a_number_of_examples_that_nobody_has_taught_is_refused(self, examples):
+        with pytest.raises(ValueError, match=f"a kernel of {examples} examples"):
+            build(Checkpoint("kernel", BINS, FILTERS, "thesis-sim", None, "lira demo", 0, examples=examples))
 
     def test_one_that_was_taught_nothing_stands(self, tmp_path):
         back, _ = load_checkpoint(self.saved(tmp_path, novice().frozen()))
@@ -176,6 +182,7 @@ class TestFile:
             lambda weights: weights | {"x": weights["x"][:, 1:]},
             lambda weights: weights | {"gain": np.full(1, np.nan, np.float32)},
             lambda weights: {name: value for name, value in weights.items() if name != "y"},
+            lambda weights: weights | {name: weights[name][:-1] for name in ("x", "y", "noise")},
         ],
     )
     def test_one_that_does_not_fit_is_refused(self, tmp_path, damage):
