@@ -11,6 +11,7 @@ from msgspec import Meta
 from safetensors import SafetensorError, safe_open
 from safetensors.numpy import save
 
+from fusion.kernel_net import KernelNet
 from fusion.networks import IMAGE_PX, CameraNet, FusionNet, Kind, LidarNet, Network, Weights
 from hal.config import MALFORMED, open_regular, write_whole
 from hal.errors import StorageError
@@ -19,6 +20,7 @@ from hal.profile import MAX_BINS, MAX_FILTERS, MAX_IMAGE_PX
 MOST_BYTES = 2**28  # eighty times the largest network that any robot here needs
 LEAST_PX = 6  # two convolutions and a pooling leave one pixel of it
 
+MOST_EXAMPLES = 4096
 _KEY = "lira"  # the one metadata entry, JSON
 _Share = Annotated[float, Meta(ge=-1.01, le=1.01)]  # of a robot's top speed
 
@@ -30,6 +32,7 @@ class Checkpoint:
     `cruise` is an expert's measured action (linear, angular) on an empty straight course; `provenance` the command
     that made it. `bins`, `filters` and `px` are the sizes of the sensors' trunks, also for the one that is not used.
     `labels` and `training_steps` are what it took; None for a file that was written before they were counted.
+    `examples` is how many a kernel drives by; a network drives by none, and its file does not speak of them.
     """
 
     kind: Kind
@@ -42,11 +45,13 @@ class Checkpoint:
     px: Annotated[int, Meta(ge=LEAST_PX, le=MAX_IMAGE_PX)] = IMAGE_PX
     labels: int | None = None
     training_steps: int | None = None
+    examples: Annotated[int, Meta(ge=0, le=MOST_EXAMPLES)] = 0
 
 
 def save_checkpoint(path: Path, network: Network, checkpoint: Checkpoint) -> None:
     """Write a checkpoint whole or not at all. Raises `StorageError`."""
-    write_whole(path, save(network.weights(), {_KEY: json.dumps(asdict(checkpoint))}), folder=True)
+    about = {name: value for name, value in asdict(checkpoint).items() if name != "examples" or value}
+    write_whole(path, save(network.weights(), {_KEY: json.dumps(about)}), folder=True)
 
 
 def load_checkpoint(path: Path) -> tuple[Network, Checkpoint]:
@@ -104,4 +109,6 @@ def build(checkpoint: Checkpoint) -> Network:
         return CameraNet(checkpoint.filters, px=checkpoint.px, seed=checkpoint.seed)
     if checkpoint.kind == "lidar":
         return LidarNet(checkpoint.bins, seed=checkpoint.seed)
+    if checkpoint.kind == "kernel":
+        return KernelNet(checkpoint.bins, checkpoint.filters, px=checkpoint.px, examples=checkpoint.examples)
     return FusionNet(checkpoint.bins, checkpoint.filters, px=checkpoint.px, seed=checkpoint.seed)

@@ -1,4 +1,4 @@
-"""HG-DAgger's doubt: how far an ensemble disagrees, and the robot that stops and asks where that is too far.
+"""The robot that stops and asks where it doubts, and HG-DAgger's doubt: how far an ensemble disagrees.
 
 d(O) = ||diag Cov_b[pi_b(O)]||_2 over the ensemble's policies pi_b. The threshold tau is the mean of the last quarter
 of the doubts that were logged when the human took over (Kelly et al., 2019).
@@ -51,13 +51,17 @@ class DoubtLog:
         """tau so far."""
         return threshold(self.doubts)
 
+    def exceeds(self, features: Features) -> bool:
+        """Whether the doubt is above tau."""
+        return self.doubt(features) > self.threshold
+
 
 class Doubtful:
-    """The novice alone; where it doubts more than tau it stands and asks. Nothing is learned from the answer."""
+    """A novice alone; where it `doubts` too much it stands and asks. Nothing is learned from the answer."""
 
-    def __init__(self, novice: Policy, log: DoubtLog) -> None:
+    def __init__(self, novice: Policy, doubts: Callable[[Features], bool]) -> None:
         self._novice = novice
-        self._log = log
+        self._doubts = doubts
 
     def reset(self) -> None:
         """Nothing to forget."""
@@ -68,7 +72,7 @@ class Doubtful:
     def propose(self, features: Features) -> Proposal:
         """The novice's action, or to stand and call for feedback."""
         a_n = self._novice(features)
-        if self._log.doubt(features) > self._log.threshold:
+        if self._doubts(features):
             return Proposal(features, Choice("novice", STAND, call=Call.FEEDBACK), a_n)
         return Proposal(features, Choice("novice", a_n), a_n)
 

@@ -1,8 +1,10 @@
 """Experts by name: those that come with the project, or a user's own checkpoint by path."""
 
 from fusion.checkpoint import Checkpoint, load_checkpoint
+from fusion.doubt import Doubtful
 from fusion.expert_files import expert_path
-from fusion.method import Expert
+from fusion.kernel_net import KernelNet
+from fusion.method import Alone, Expert
 from fusion.networks import Network
 from fusion.preprocess import Features
 from fusion.tasks import DEFAULT
@@ -17,7 +19,7 @@ def load_network(name_or_path: str, profile: RobotProfile, pair: str = DEFAULT) 
     network, checkpoint = load_checkpoint(path)
     shape = profile.features
     needs = {"camera": shape.filters == checkpoint.filters, "lidar": shape.bins == checkpoint.bins}
-    fits = all(needs.values()) if checkpoint.kind == "fusion" else needs[checkpoint.kind]
+    fits = needs.get(checkpoint.kind, all(needs.values()))
     if not fits:
         raise ConfigError(
             f"{path} was trained for '{checkpoint.profile}' ({checkpoint.bins} beams, {checkpoint.filters} filters), "
@@ -34,6 +36,17 @@ def as_expert(name: str, network: Network, cruise: Action | None) -> Expert:
         return network.act(features.scan, features.image)
 
     return Expert(name, act) if cruise is None else Expert(name, act, cruise)
+
+
+def load_alone(name_or_path: str, profile: RobotProfile, pair: str = DEFAULT, *, ask: bool = False) -> Alone | Doubtful:
+    """Load a policy to drive alone; with `ask` it stands and calls where it doubts. `ConfigError`: it cannot tell."""
+    network, checkpoint = load_network(name_or_path, profile, pair)
+    act = as_expert(checkpoint.kind, network, checkpoint.cruise).act
+    if not ask:
+        return Alone(checkpoint.kind, act)
+    if not isinstance(network, KernelNet):
+        raise ConfigError(f"'{name_or_path}' cannot tell what it does not know", "A novice taught by plus can.")
+    return Doubtful(act, network.doubts)
 
 
 def load_expert(name_or_path: str, profile: RobotProfile, pair: str = DEFAULT) -> Expert:

@@ -21,6 +21,10 @@ class Futures(Protocol):
         """Distance left of the line."""
 
     @property
+    def progress_m(self) -> NDArray[np.float64]:
+        """Distance along the line."""
+
+    @property
     def heading_error_rad(self) -> NDArray[np.float64]:
         """Yaw relative to the line."""
 

@@ -21,7 +21,7 @@ HIDDEN = 64  # units of a lidar layer
 FUSION_HIDDEN = 128
 IMAGE_PX = 32
 
-Kind = Literal["camera", "lidar", "fusion"]
+Kind = Literal["camera", "lidar", "fusion", "kernel"]
 Weights = dict[str, NDArray[np.float32]]
 """All parameters of a network by name, detached from it."""
 
@@ -68,6 +68,11 @@ class Network(nn.Module, ABC):
     """A policy: `features` is the trunk's output, `head` turns it into actions [n, 2] in [-1, 1]."""
 
     kind: ClassVar[Kind]
+
+    @property
+    def examples(self) -> int:
+        """How many labels it drives by; 0 for one that has only been trained on them."""
+        return 0
 
     @abstractmethod
     def features(self, scan: Tensor, image: Tensor, /) -> Tensor:

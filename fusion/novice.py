@@ -1,9 +1,15 @@
-"""The novice Pi^N and its labels D^N: it acts, drops redundant labels, and trains whenever m new ones are stored."""
+"""The novice Pi^N and its labels D^N: it acts and drops redundant labels; a network trains whenever m new are stored.
 
+The other novice there is learns from every label at once: `fusion/kernel_novice.py`.
+"""
+
+import copy
 import math
 import time
+from abc import ABC, abstractmethod
 from typing import Literal, Protocol
 
+from fusion.ensemble import EnsembleNet
 from fusion.labels import is_rest
 from fusion.learner import Label, Weights
 from fusion.networks import Network
@@ -54,26 +60,48 @@ def is_redundant(a: Action, a_n: Action, threshold: float) -> bool:
     return all(abs(x - y) < threshold for x, y in zip(a, a_n, strict=True))
 
 
-class Novice:
-    """A policy under training. Weights are swapped between two steps, never during one."""
+class Novice(ABC):
+    """A policy under training. It changes between two steps, never during one."""
 
-    def __init__(self, network: Network, trainer: Trainer, settings: LearningSettings) -> None:
-        self.network = network
+    def __init__(self, settings: LearningSettings) -> None:
         self.settings = settings
         self.stored = 0
         self.training_steps = 0  # finished ones
-        self._trainer = trainer
-        self._fresh = 0  # stored since the last training step that m labels brought began
-        self._hurried = 0  # training steps asked for beside those
 
     @property
     def trained(self) -> bool:
         """Whether the first training step is done."""
         return self.training_steps > 0
 
+    @abstractmethod
     def act(self, features: Features) -> Action:
-        """a^N of the current network."""
-        return self.network.act(features.scan, features.image)
+        """a^N as it is now."""
+
+    def alone(self, features: Features) -> Action:
+        """What it does when nobody teaches it any more: the same, unless a novice knows how it errs."""
+        return self.act(features)
+
+    def proving(self, features: Features) -> Action:
+        """The same in a run that proves it, from which it may learn what it knows."""
+        return self.alone(features)
+
+    def knows(self, features: Features, share: float) -> bool:  # noqa: ARG002
+        """Whether it is surer here than it was at all but that share of what a human had to show it; never if it
+        cannot tell.
+        """
+        return False
+
+    @abstractmethod
+    def remember(self, label: Label) -> None:
+        """Take in a label: a new one, or one that an earlier session stored."""
+
+    @abstractmethod
+    def frozen(self) -> Network:
+        """Return a copy of the policy as it drives alone, to be saved."""
+
+    def set_aside(self) -> list[tuple[int, str]]:
+        """Number and source of the labels it does not believe; none, unless a novice can tell."""
+        return []
 
     def learn(self, features: Features, action: Action, source: str, a_n: Action) -> bool:
         """Store a label unless it is redundant; `a_n` is the novice's own action there. Returns whether it was kept."""
@@ -92,11 +120,39 @@ class Novice:
         """How much a label of this source counts."""
         return self.settings.human_weight if source == "human" else 1.0
 
+    def update(self, now_s: float) -> None:  # noqa: B027 - who has learned already has nothing to adopt
+        """Adopt what training has brought, and begin what is due."""
+
+    def catch_up(self) -> None:  # noqa: B027
+        """Wait until everything that is due is learned."""
+
+    def close(self) -> None:  # noqa: B027
+        """End the training, in bounded time."""
+
+
+class NetworkNovice(Novice):
+    """A network, trained beside the loop. Weights are swapped between two steps."""
+
+    def __init__(self, network: Network, trainer: Trainer, settings: LearningSettings) -> None:
+        super().__init__(settings)
+        self.network = network
+        self._trainer = trainer
+        self._fresh = 0  # stored since the last training step that m labels brought began
+
+    def act(self, features: Features) -> Action:
+        """a^N of the current network."""
+        return self.network.act(features.scan, features.image)
+
     def remember(self, label: Label) -> None:
-        """Take in a label that an earlier session stored."""
+        """Hand a label to the trainer."""
         self._trainer.add(label)
         self.stored += 1
         self._fresh += 1
+
+    def frozen(self) -> Network:
+        """Copy the network, without an ensemble that only doubts."""
+        network = copy.deepcopy(self.network)
+        return network.novice() if isinstance(network, EnsembleNet) else network
 
     def update(self, now_s: float) -> None:
         """Adopt weights that are ready; begin a training step if one is due: the remainder of m labels is carried."""
@@ -104,18 +160,9 @@ class Novice:
         if weights is not None:
             self.network.load_weights(weights)
             self.training_steps += 1
-        if self._trainer.pending:
-            return
-        if self._fresh >= self.settings.labels_per_step:
+        if not self._trainer.pending and self._fresh >= self.settings.labels_per_step:
             self._fresh -= self.settings.labels_per_step
             self._trainer.start(now_s)
-        elif self._hurried:
-            self._hurried -= 1
-            self._trainer.start(now_s)
-
-    def hurry(self, steps: int) -> None:
-        """Ask for training steps beside those that m labels bring, as soon as the trainer is free."""
-        self._hurried = steps if self.stored else 0
 
     def catch_up(self) -> None:
         """Run the training steps that are due, one after the other, and wait for them. The remainder is carried."""

@@ -6,7 +6,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from fusion.foresight import Foresight
+from fusion.foresight import Foresight, Futures
 from hal.messages import Action, CourseState
 
 Style = Literal["bang-bang", "proportional"]
@@ -18,6 +18,8 @@ COMFORT_M = 0.40  # clearance below which closeness costs
 STAY_COST = 0.05  # of turning otherwise than the last plan: a small one lets full steer settle on the line
 SPOT_STAY_COST = 1.0  # after a turn on the spot: who turns to and fro there never gets away
 TOUCH_M = 0.03
+ASKEW_RAD = 1.0  # from here on the robot may be driving the line the wrong way, and progress lost costs
+RETREAT_COST = 3.0  # of each metre: more than to turn round, on the spot or beside the line
 
 
 class Planner:
@@ -64,6 +66,7 @@ class Planner:
             100.0 * (1.0 - first_hit / steps)
             + 3.0 * (closeness**2).mean(axis=1)
             + self._follow * (3.0 * (lateral**2).mean(axis=1) + 0.2 * lateral[:, -1] + 0.3 * heading)
+            + self._follow * RETREAT_COST * _retreat_m(futures, state)
             + 0.15 * self._effort
             + 8.0 * self._standing
         )
@@ -75,6 +78,17 @@ class Planner:
         side = np.sign(turns[int(np.argmin(cost))])
         weight = np.exp(-(cost - cost.min()) / 0.05) * (turns * side >= 0.0)
         return float(np.average(turns, weights=weight))
+
+
+def _retreat_m(futures: Futures, state: CourseState) -> NDArray[np.float64]:
+    """Progress that each future loses, [N], where the robot is askew: else to swing out around a box would cost.
+
+    Without it a plan that goes on the wrong way looks better than one that turns round: the end of neither faces along
+    the line, and the turn leaves it.
+    """
+    if not np.abs(futures.heading_error_rad[:, 0]).min() > ASKEW_RAD:
+        return np.zeros(len(futures.progress_m))
+    return np.maximum(state.progress_m - futures.progress_m[:, -1], 0.0)
 
 
 def action_sequences(style: Style, period_s: float) -> NDArray[np.float64]:

@@ -4,55 +4,39 @@
   what active experts agree on.
 - Reservation: an expert's label counts only once a second has passed without the human correcting what the expert did.
 - A choice as an answer: instead of driving, the human may give the wheel to an expert for a while.
-- Memory: where the human has resolved an ambiguity that looked the same, the call is not made again.
-- At once: when the human lets go, what was shown is learned before the next m labels are there.
-- Confidence: where an ensemble of novices agrees as it hardly ever did when the human took over, the novice drives,
-  and nobody is called.
+- Sureness: where the experts disagree and the novice says that it knows, it drives, and nobody is called.
+
+Its novice is that of `fusion/kernel.py`.
 """
 
 from collections import deque
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
-import numpy as np
-
-from fusion.doubt import DoubtLog
-from fusion.lira import LiraSettings, LiraSpf, choose, in_consensus
-from fusion.memory import Memory
+from fusion.lira import LiraSettings, LiraSpf, choose
 from fusion.method import Call, Choice, Expert, Lesson, Policy, Proposal, Settled
 from fusion.novice import Novice
 from fusion.preprocess import Features
 from hal.config import Table
-from hal.messages import Action, ExpertView
+from hal.messages import Action
 
 
 class PlusSettings(Table, frozen=True, tag="plus"):
-    """What `plus` adds to `lira`. 0 switches a part off, for `recall` and `sure` None."""
+    """What `plus` adds to `lira`. 0 switches a part off, for `sure` None."""
 
     lira: LiraSettings = LiraSettings()
     prefill: int = 60  # labels the experts give before the human is asked
     reserve_s: float = 1.0  # an expert's label waits so long for the human's objection
     wheel_s: float = 1.0  # an expert that was given the wheel keeps it so long
-    at_once: int = 3  # training steps whenever the human lets go
-    recall: float | None = 0.9  # share of resolved ambiguities that the memory knows again (conformal)
-    sure: float | None = 0.25  # in doubt less than in the calmest share of the moments of take-over, it is sure
-    ensemble: int = 5
+    sure: float | None = None  # surer than at all but this share of what the human showed, the novice is not helped
+    ask: bool = False  # on unseen layouts it stops and asks where it doubts
 
 
 class LiraPlus(LiraSpf):
     """LIRA-SPF that asks less."""
 
-    def __init__(
-        self,
-        experts: Sequence[Expert],
-        novice: Novice,
-        settings: PlusSettings,
-        period_s: float,
-        log: DoubtLog | None = None,
-    ) -> None:
+    def __init__(self, experts: Sequence[Expert], novice: Novice, settings: PlusSettings, period_s: float) -> None:
         self._plus = settings
-        self._log = log
-        self._memory = None if settings.recall is None else Memory(novice.network, settings.recall)
         self._reserve = round(settings.reserve_s / period_s)
         self._wheel_steps = round(settings.wheel_s / period_s)
         self._gifts = 0
@@ -63,9 +47,6 @@ class LiraPlus(LiraSpf):
         super().reset()
         self._reserved: deque[Proposal] = deque()
         self._wheel, self._left = "", 0
-        self._human_drove = False
-        if self._memory is not None:
-            self._memory.end()
 
     @property
     def offers(self) -> Mapping[str, Policy]:
@@ -81,16 +62,14 @@ class LiraPlus(LiraSpf):
         return None
 
     def propose(self, features: Features) -> Proposal:
-        """Algorithm 1, unless an expert was given the wheel, the call was answered before, or all begins."""
+        """Algorithm 1, unless an expert was given the wheel, the novice is sure, or all begins."""
         proposal = super().propose(features)
         if self._left:
             action = next(view.action for view in proposal.experts if view.name == self._wheel)
             return replace(proposal, choice=Choice(self._wheel, action, label=action, given=self._gifts), speed=1.0)
         if self.novice.stored < self._plus.prefill:
             return self._prefill(proposal)
-        choice = proposal.choice
-        known = choice.call is Call.FEEDBACK and self._knows(features)
-        if self.novice.trained and (known or (choice.call is not Call.NONE and self._sure(features))):
+        if proposal.choice.call is not Call.NONE and self.novice.trained and self._sure(features):
             return replace(proposal, choice=Choice("novice", proposal.novice), speed=1.0)
         return proposal
 
@@ -98,12 +77,6 @@ class LiraPlus(LiraSpf):
         """Learn from the human at once, and from an expert when nobody has objected for a while."""
         objection = human is not None or (proposal.choice.given and self._left == self._wheel_steps)
         dropped = self._drop() if objection else ()
-        if objection and not self._human_drove and self._log is not None and self.novice.trained:
-            self._log.take_over(proposal.features)
-        if self._human_drove and human is None:
-            self.novice.hurry(self._plus.at_once)
-        self._human_drove = human is not None
-        self._remember(proposal, human)
         if human is not None:
             self._left = 0
             return replace(super().learn(proposal, human), settled=dropped)
@@ -133,24 +106,6 @@ class LiraPlus(LiraSpf):
             choice = replace(choice, label=None)
         return replace(proposal, choice=choice, speed=self.settings.slow_down if choice.call is Call.FEEDBACK else 1.0)
 
-    def _knows(self, features: Features) -> bool:
-        return self._memory is not None and self._memory.knows(features)
-
     def _sure(self, features: Features) -> bool:
-        """Whether the ensemble agrees more than it did at nearly all take-overs."""
-        if self._log is None or self._plus.sure is None or len(self._log.doubts) < 1.0 / self._plus.sure:
-            return False
-        return self._log.doubt(features) < float(np.quantile(self._log.doubts, self._plus.sure))
-
-    def _remember(self, proposal: Proposal, human: Action | None) -> None:
-        """Keep the ambiguities that the human resolves, by driving or by giving the wheel."""
-        if self._memory is None:
-            return
-        if human is None and not proposal.choice.given:
-            self._memory.end()
-        elif self._ambiguous(proposal.experts):
-            self._memory.add(proposal.features)
-
-    def _ambiguous(self, experts: Sequence[ExpertView]) -> bool:
-        active = [expert.action for expert in experts if expert.active]
-        return len(active) > 1 and not in_consensus(active, self._consensus)
+        """Whether the novice knows what to do here."""
+        return self._plus.sure is not None and self.novice.knows(features, self._plus.sure)

@@ -9,11 +9,13 @@ import msgspec
 
 from fusion.cloning import CloningSettings
 from fusion.hg_dagger import HgDaggerSettings
+from fusion.kernel import KernelSettings
 from fusion.lira import PRESETS, LiraSettings
 from fusion.novice import LearningSettings
 from fusion.plus import PlusSettings
 from fusion.shared_feedback import SharingSettings
 from fusion.switching import SwitchingSettings
+from fusion.syllabus import FRESH, THESIS, Syllabus
 from hal.errors import ConfigError
 
 Approach = LiraSettings | PlusSettings | HgDaggerSettings | CloningSettings | SwitchingSettings
@@ -27,6 +29,8 @@ class Method(msgspec.Struct, frozen=True):
     no experts, so they learn from scratch; variants of HG-DAgger that profit from experts say so in their name.
     `warm` names the experts that teach the novice what they do on their own training course before any human does.
     `mirrored` learns every label once more with left and right exchanged. `sharing` adds Appendix D to LIRA-SPF.
+    `kernel`: the novice is that regression on the experts' trunks instead of a network. `syllabus`: on which layouts it
+    is taught and proven.
     """
 
     name: str
@@ -36,6 +40,8 @@ class Method(msgspec.Struct, frozen=True):
     warm: tuple[Sensor, ...] = ()
     mirrored: bool = False
     sharing: SharingSettings | None = None
+    kernel: KernelSettings | None = None
+    syllabus: Syllabus = THESIS
 
     @property
     def kind(self) -> str:
@@ -50,9 +56,10 @@ _M10 = LearningSettings(labels_per_step=10)
 _BOTH: tuple[Sensor, ...] = ("camera", "lidar")
 
 
-def _plus(name: str, *, learning: LearningSettings = _HEAVY, mirrored: bool = True, **changes: float | None) -> Method:
-    """Return `plus` with changes to its settings."""
-    return Method(name, msgspec.structs.replace(PlusSettings(), **changes), learning, mirrored=mirrored)
+def _plus(name: str, **changes: object) -> Method:
+    """Return `plus` with changes to it."""
+    plus = Method(name, PlusSettings(), _HEAVY, mirrored=True, kernel=KernelSettings(), syllabus=FRESH)
+    return msgspec.structs.replace(plus, **changes)
 
 
 METHODS = {
@@ -67,15 +74,17 @@ METHODS = {
         Method("hold-scratch", _HOLD, trunks="scratch"),
         Method("hold-mirrored", _HOLD, mirrored=True),
         _plus("plus"),
-        _plus("plus-no-prefill", prefill=0),
-        _plus("plus-no-reserve", reserve_s=0.0),
+        _plus("plus-no-prefill", approach=PlusSettings(prefill=0)),
+        _plus("plus-no-reserve", approach=PlusSettings(reserve_s=0.0)),
         _plus("plus-no-weight", learning=_M10),
         _plus("plus-no-mirror", mirrored=False),
-        _plus("plus-no-wheel", wheel_s=0.0),
-        _plus("plus-no-memory", recall=None),
-        _plus("plus-no-confidence", sure=None),
-        _plus("plus-no-at-once", at_once=0),
-        _plus("plus-m30", learning=LearningSettings(human_weight=3.0)),
+        _plus("plus-no-wheel", approach=PlusSettings(wheel_s=0.0)),
+        _plus("plus-no-cleaning", kernel=KernelSettings(contradicts=None)),
+        _plus("plus-no-gain", kernel=KernelSettings(gain=1.0)),
+        _plus("plus-network", kernel=None),
+        _plus("plus-sure", approach=PlusSettings(sure=0.25)),
+        _plus("plus-ask", approach=PlusSettings(ask=True)),
+        _plus("plus-own", syllabus=THESIS),
         Method("hg-dagger", _HG, trunks="scratch"),
         Method("hg-dagger-m10", _HG, _M10, trunks="scratch"),
         Method("hg-dagger-mirrored", _HG, trunks="scratch", mirrored=True),
@@ -84,6 +93,9 @@ METHODS = {
         Method("hg-dagger-warm", _HG, warm=_BOTH),
         Method("hg-dagger-warm-m10", _HG, _M10, warm=_BOTH),
         Method("hg-dagger-warm-m10-mirrored", _HG, _M10, warm=_BOTH, mirrored=True),
+        Method("hg-dagger-fresh", _HG, trunks="scratch", syllabus=FRESH),
+        Method("hg-dagger-kernel", _HG, _HEAVY, mirrored=True, kernel=KernelSettings(), syllabus=FRESH),
+        Method("hold-kernel", _HOLD, _HEAVY, mirrored=True, kernel=KernelSettings(), syllabus=FRESH),
         Method("cloning", CloningSettings(), LearningSettings(filter_human=False), trunks="scratch"),
         Method("switching", SwitchingSettings()),
     )

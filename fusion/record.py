@@ -111,7 +111,11 @@ class RunRecord(msgspec.Struct, frozen=True, tag="run"):
 
 
 class ResultRecord(msgspec.Struct, frozen=True, tag="result"):
-    """The end of a run. `converged` is False for a run that met its cap: reported as censored, never dropped."""
+    """The end of a run. `converged` is False for a run that met its cap: reported as censored, never dropped.
+
+    `proof` says what `converged` means: the novice alone passed a lap of the layout it was taught on ("own"), or so
+    many fresh ones in a row ("fresh:3").
+    """
 
     converged: bool
     laps: int
@@ -124,6 +128,7 @@ class ResultRecord(msgspec.Struct, frozen=True, tag="result"):
     simulated_s: float
     elapsed_s: float
     account: Account = Account()
+    proof: str = "own"
 
 
 Record = RunRecord | StepRecord | LapRecord | ResultRecord

@@ -44,6 +44,36 @@ class Drive:
     final_lateral_m: float = float("inf")
 
 
+class Course(Protocol):
+    """What is driven, lap by lap, numbers counting from 1."""
+
+    @property
+    def spare(self) -> int:
+        """How many proving runs after one lap may fail."""
+
+    def taught(self, number: int, /) -> Sequence[Drive]:
+        """The drives of a training lap."""
+
+    def proven(self, number: int, /) -> Sequence[Sequence[Drive]]:
+        """The proving runs after it, each some drives."""
+
+
+@dataclass(frozen=True, slots=True)
+class Same:
+    """The same drives every lap, and to prove the novice: the thesis's course, and that of an expert."""
+
+    drives: Sequence[Drive]
+    spare: int = 0
+
+    def taught(self, _: int, /) -> Sequence[Drive]:
+        """All drives."""
+        return self.drives
+
+    def proven(self, _: int, /) -> Sequence[Sequence[Drive]]:
+        """All drives, as one proving run."""
+        return [self.drives]
+
+
 @dataclass(slots=True)
 class Tally:
     """What happened in one lap."""
@@ -83,29 +113,34 @@ class Session:
         self._loop = loop
         self._journal = journal
         self._apprentice = apprentice
-        self._driver = alone or (lambda _: Alone("novice", self._pupil.novice.act))
+        self._driver = alone or (lambda _: Alone("novice", self._pupil.novice.alone))
         self._began_s = robot.now()
         self._laps = 0
 
-    def teach(self, drives: Sequence[Drive], teacher: Teacher, laps: int, *, all_laps: bool = False) -> bool:
-        """Train until the novice passes a proving run on the same drives, or through `all_laps` whatever it can.
+    def teach(self, course: Course, teacher: Teacher, laps: int, *, all_laps: bool = False) -> bool:
+        """Train until the novice passes every proving run that follows a training lap, or through `all_laps` anyway.
 
-        Returns whether the last proving run was passed; False if `laps` were not enough.
+        Returns whether the last ones were passed; False if `laps` were not enough.
         """
         proven = False
         pupil = self._pupil
         for lap in range(1, laps + 1):
             self._laps = lap
-            self._lap(pupil, drives, "train", lap, teacher)
+            self._lap(pupil, course.taught(lap), "train", lap, teacher)
             pupil.reset()  # the lap is over: who learns by laps learns now
-            proven = pupil.novice.trained and self._alone(drives, "prove", lap).passed
+            proven = pupil.novice.trained and self.prove(course, lap)
             if proven and not all_laps:
                 break
         return proven
 
-    def prove(self, drives: Sequence[Drive]) -> bool:
-        """One proving run and no teaching. Returns whether it was passed."""
-        return self._alone(drives, "prove", 1).passed
+    def prove(self, course: Course, lap: int = 1) -> bool:
+        """The proving runs that belong to a lap, until it is plain how they end. Returns whether enough were passed."""
+        failed = 0
+        for drives in course.proven(lap):
+            failed += not self._alone(drives, "prove", lap).passed
+            if failed > course.spare:
+                return False
+        return True
 
     def show(self, drives: Sequence[Drive], teacher: Teacher | None = None) -> list[LapRecord]:
         """Let the frozen novice drive, each drive a lap of its own; after a crash it goes on behind it.
@@ -114,8 +149,8 @@ class Session:
         """
         return [self._alone([drive], "unseen", lap, teacher) for lap, drive in enumerate(drives, start=1)]
 
-    def result(self, converged: bool) -> ResultRecord:
-        """Sum the session up."""
+    def result(self, converged: bool, proof: str = "own") -> ResultRecord:
+        """Sum the session up; `proof` says what `converged` means, as in `fusion.syllabus`."""
         ledger = self._journal.ledger
         return ResultRecord(
             converged=converged,
@@ -129,6 +164,7 @@ class Session:
             simulated_s=self._robot.now() - self._began_s,
             elapsed_s=self._journal.elapsed_s,
             account=ledger.account,
+            proof=proof,
         )
 
     @property

@@ -39,6 +39,7 @@ class TeacherSettings(Table, frozen=True):
     stall: Share = 0.3  # a policy that drives less than this share of full speed over the horizon stands in the way
     wander_rad: float = 0.1  # a larger turn within the horizon, without a box in the way, is wrong then
     safe_steps: int = 3
+    longest_s: float = 20.0  # after so long at the wheel a hand gives up: whatever it does there does not help
     turn_rad_s: float = 1.1  # a hand turns a robot no faster, whatever the robot can do
     delay_s: float = 0.6  # median of the log-normal reaction delay
     called_delay_s: float = 0.35
@@ -86,6 +87,7 @@ class ScriptedTeacher:
         self._driving = False
         self._react_at_s: float | None = None  # when a danger that was seen will be answered
         self._safe = 0
+        self._took_over_s = -math.inf
         self._gain, self._wrong_steps = 1.0, 0
         self._planner.reset()
 
@@ -98,13 +100,14 @@ class ScriptedTeacher:
         danger = self._danger(state, proposal, policy)
         if self._driving:
             self._safe = 0 if danger else self._safe + 1
-            self._driving = self._safe < self._settings.safe_steps and not proposal.relieves
+            gives_up = state.stamp_s >= self._took_over_s + self._settings.longest_s
+            self._driving = self._safe < self._settings.safe_steps and not proposal.relieves and not gives_up
         elif self._reacts(state.stamp_s, danger, alert=_asks(proposal)):
             name = self._pick(state, offers)
             if name is not None:
                 self._react_at_s = None
                 return name
-            self._take_over()
+            self._take_over(state.stamp_s)
         if not self._driving:
             return None
         return self._with_faults(self._planner.plan(state))
@@ -191,8 +194,9 @@ class ScriptedTeacher:
             self._react_at_s = math.inf if missed else now_s + delay
         return now_s >= self._react_at_s - 1e-9
 
-    def _take_over(self) -> None:
+    def _take_over(self, now_s: float) -> None:
         self._driving, self._safe, self._react_at_s = True, 0, None
+        self._took_over_s = now_s
         self._gain = math.exp(self._settings.gain_sigma * self._random.standard_normal())
         self._wrong_steps = 2 if self._random.random() < self._settings.wrong_direction else 0
         self._planner.reset()

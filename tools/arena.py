@@ -10,12 +10,12 @@ import msgspec
 
 from fusion.control import ControlLoop
 from fusion.demonstrations import DemonstrationLog
-from fusion.experts import load_expert
+from fusion.experts import load_alone
 from fusion.journal import Journal
-from fusion.method import Alone
 from fusion.presets import Method
 from fusion.record import Record, RunWriter
-from fusion.session import Drive, Session
+from fusion.session import Session
+from fusion.syllabus import THESIS
 from fusion.tasks import task_of
 from fusion.teacher import TEACHERS
 from fusion.trainer import ProcessTrainer
@@ -23,11 +23,10 @@ from hal.bus import Bus
 from hal.errors import ConfigError
 from hal.messages import Decision
 from hal.port import Arena
-from hal.profile import RobotProfile
 from hal.remote import RemoteArena, RemoteRobot
 from hal.remote_arena import WiredArena
 from sim_backend.world import World
-from tools.assembly import crew, lap, teacher
+from tools.assembly import Course, crew, teacher
 from tools.lifetime import CLOSE_S, saving
 from tools.progress import Progress
 from tools.run_folder import LABELS, RECORD, head, snapshot
@@ -57,27 +56,29 @@ def teach(args: argparse.Namespace, method: Method, robot: RemoteRobot, publish:
             loop = ControlLoop(robot, truth=arena.state)
             session = Session(robot, arena, loop, journal, team.pupil, team.alone)
             loop.arm()
-            course = [lap(profile, world, args.layout)]
+            syllabus = method.syllabus
+            course = Course(profile, world, args.layout, syllabus)
             if team.pupil is None:
                 converged = session.prove(course)
             else:
                 novice = team.pupil.novice
                 with saving(lambda: snapshot(folder, novice, profile, args), say):
                     converged = session.teach(course, hand, args.train_laps)
-            session.show(unseen(args, profile, world), hand if team.answered else None)
-            write(session.result(converged))
+            session.show(course.unseen(args.layout + 1, args.unseen), hand if team.answered else None)
+            write(session.result(converged, syllabus.proof))
     return 0 if converged else 1
 
 
 def examine(args: argparse.Namespace, robot: RemoteRobot, publish: Publish, say: Say) -> int:
     """Let a policy drive the layouts after `args.layout`; it goes on behind a crash. Returns 1 if any failed."""
     with arena_of(args, robot) as (arena, world):
-        policy = load_expert(args.policy, robot.profile, args.experts or task_of(world.name))
+        policy = load_alone(args.policy, robot.profile, args.experts or task_of(world.name), ask=args.ask)
         journal = Journal(write=telling(say), publish=publish)
         loop = ControlLoop(robot, truth=arena.state)
-        session = Session(robot, arena, loop, journal, None, lambda _: Alone(policy.name, policy.act))
+        session = Session(robot, arena, loop, journal, None, lambda _: policy)
         loop.arm()
-        laps = session.show(unseen(args, robot.profile, world))
+        course = Course(robot.profile, world, args.layout, THESIS)
+        laps = session.show(course.unseen(args.layout + 1, args.unseen))
     return 0 if all(each.passed for each in laps) else 1
 
 
@@ -94,11 +95,6 @@ def arena_of(args: argparse.Namespace, robot: RemoteRobot) -> Iterator[tuple[Are
         yield wired, _world(wired.info)
     finally:
         bus.close(CLOSE_S)
-
-
-def unseen(args: argparse.Namespace, profile: RobotProfile, world: World) -> list[Drive]:
-    """Laps of the layouts after the one that is taught."""
-    return [lap(profile, world, args.layout + 1 + k) for k in range(args.unseen)]
 
 
 def _world(info: bytes) -> World:

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 
 from fusion.cloning import Cloning, CloningSettings
 from fusion.doubt import Doubtful, DoubtLog
@@ -9,17 +10,20 @@ from fusion.ensemble import EnsembleNet
 from fusion.expert_files import SHIPPED
 from fusion.experts import as_expert, load_network
 from fusion.hg_dagger import HgDagger, HgDaggerSettings
+from fusion.kernel_net import KernelNet
+from fusion.kernel_novice import KernelNovice
 from fusion.learner import Learner
 from fusion.lira import LiraSettings, LiraSpf
 from fusion.method import Alone, Expert
 from fusion.method import Method as Driver
 from fusion.networks import CameraNet, FusionNet, LidarNet, Network
-from fusion.novice import Novice, Trainer
+from fusion.novice import NetworkNovice, Novice, Trainer
 from fusion.plus import LiraPlus, PlusSettings
-from fusion.presets import Approach, Method
+from fusion.presets import Method
 from fusion.session import Apprentice, Drive
 from fusion.shared_feedback import SharedFeedback
 from fusion.switching import Switching, SwitchingSettings
+from fusion.syllabus import Syllabus
 from fusion.tasks import DEFAULT
 from fusion.teacher import ScriptedTeacher, TeacherSettings
 from hal.errors import ConfigError
@@ -60,11 +64,19 @@ def crew(
         rule = Switching(camera, lidar, approach, profile.features.max_range_m)
         return Crew(None, lambda _: rule)
     pupil = apprentice(method, profile, seed, trainer, pair)
-    novice = Alone("novice", pupil.novice.act)
-    if isinstance(pupil, HgDagger) and isinstance(approach, HgDaggerSettings) and pupil.log is not None:
-        doubtful = Doubtful(pupil.novice.act, pupil.log)
-        return Crew(pupil, lambda phase: doubtful if phase in approach.doubt else novice, "unseen" in approach.doubt)
-    return Crew(pupil, lambda _: novice)
+    doubtful: Doubtful | None = None
+    asks: tuple[str, ...] = ()
+    match pupil, approach:
+        case HgDagger(log=DoubtLog() as log), HgDaggerSettings():
+            doubtful, asks = Doubtful(pupil.novice.alone, log.exceeds), approach.doubt
+        case LiraPlus(novice=KernelNovice() as novice), PlusSettings():
+            doubtful, asks = Doubtful(novice.alone, novice.doubts), ("unseen",) if approach.ask else ()
+    frozen = {"prove": Alone("novice", pupil.novice.proving), "unseen": Alone("novice", pupil.novice.alone)}
+    return Crew(
+        pupil,
+        lambda phase: doubtful if doubtful is not None and phase in asks else frozen[phase],
+        answered="unseen" in asks,
+    )
 
 
 def apprentice(
@@ -77,26 +89,13 @@ def apprentice(
     (camera, camera_expert), (lidar, lidar_expert) = experts(profile, pair)
     if not isinstance(camera, CameraNet) or not isinstance(lidar, LidarNet):
         raise ConfigError("the experts are of the wrong kind", "Train them anew: lira train-expert camera|lidar")
-    frozen = method.trunks == "frozen"
-    shape = camera.trunk
-    network = (
-        FusionNet.from_experts(camera, lidar, seed=seed)
-        if frozen
-        else FusionNet(lidar.trunk.bins, shape.filters, px=shape.px, seed=seed)
-    )
-    ensemble: EnsembleNet | None = None
-    members = _ensemble(approach)
-    if members:
-        network = ensemble = EnsembleNet(network, members, seed)
-    learner = Learner(network, seed=seed, frozen_trunks=frozen, mirrored=method.mirrored)
-    novice = Novice(network, trainer(learner), method.learning)
+    novice, log = _novice(method, camera, lidar, seed, trainer)
     warm_up(novice, method.warm, profile, pair)
-    log = None if ensemble is None else DoubtLog(ensemble.opinions)
     match approach:
         case HgDaggerSettings():
             return HgDagger(novice, log)
         case PlusSettings():
-            return LiraPlus([camera_expert, lidar_expert], novice, approach, profile.period_s, log)
+            return LiraPlus([camera_expert, lidar_expert], novice, approach, profile.period_s)
         case CloningSettings():
             return Cloning(novice)
         case LiraSettings():
@@ -104,14 +103,24 @@ def apprentice(
             return lira if method.sharing is None else SharedFeedback(lira, method.sharing)
 
 
-def _ensemble(approach: Approach) -> int:
-    """How many policies an approach asks about its doubt."""
-    match approach:
-        case HgDaggerSettings(doubt=phases) if phases:
-            return approach.ensemble
-        case PlusSettings(sure=float()):
-            return approach.ensemble
-    return 0
+def _novice(
+    method: Method, camera: CameraNet, lidar: LidarNet, seed: int, trainer: Callable[[Learner], Trainer]
+) -> tuple[Novice, DoubtLog | None]:
+    """Build the learner of a method, and the log of its ensemble's doubts if it has one."""
+    if method.kernel is not None:
+        sees = KernelNet.from_experts(camera, lidar)
+        return KernelNovice(sees, method.learning, method.kernel, mirrored=method.mirrored), None
+    frozen, shape, log = method.trunks == "frozen", camera.trunk, None
+    network = (
+        FusionNet.from_experts(camera, lidar, seed=seed)
+        if frozen
+        else FusionNet(lidar.trunk.bins, shape.filters, px=shape.px, seed=seed)
+    )
+    if isinstance(method.approach, HgDaggerSettings) and method.approach.doubt:
+        network = ensemble = EnsembleNet(network, method.approach.ensemble, seed)
+        log = DoubtLog(ensemble.opinions)
+    learner = Learner(network, seed=seed, frozen_trunks=frozen, mirrored=method.mirrored)
+    return NetworkNovice(network, trainer(learner), method.learning), log
 
 
 def experts(profile: RobotProfile, pair: str = DEFAULT) -> list[tuple[Network, Expert]]:
@@ -123,6 +132,28 @@ def experts(profile: RobotProfile, pair: str = DEFAULT) -> list[tuple[Network, E
 def teacher(skill: TeacherSettings, profile: RobotProfile, world: World, layout: int, seed: int) -> ScriptedTeacher:
     """Build a scripted teacher that can look ahead in a twin of its own."""
     return ScriptedTeacher(Foresight(profile, world, layout), profile, skill, seed)
+
+
+class Course:
+    """The laps of a run in one world: what is taught, what has to be proven, and what is shown afterwards."""
+
+    def __init__(self, profile: RobotProfile, world: World, layout: int, syllabus: Syllabus) -> None:
+        self._lap = partial(lap, profile, world)
+        self._layout = layout
+        self._syllabus = syllabus
+        self.spare = syllabus.spare
+
+    def taught(self, number: int) -> list[Drive]:
+        """The training lap of this number, from 1."""
+        return [self._lap(self._syllabus.taught(self._layout, number))]
+
+    def proven(self, number: int) -> list[list[Drive]]:
+        """The proving runs after it."""
+        return [[self._lap(layout)] for layout in self._syllabus.proven(self._layout, number)]
+
+    def unseen(self, first: int, count: int) -> list[Drive]:
+        """Laps of layouts that nobody is taught on."""
+        return [self._lap(first + k) for k in range(count)]
 
 
 def lap(profile: RobotProfile, world: World, layout: int) -> Drive:

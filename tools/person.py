@@ -9,10 +9,9 @@ import msgspec
 
 from fusion.control import ControlLoop
 from fusion.demonstrations import DemonstrationLog, read_demonstrations
-from fusion.experts import load_expert
+from fusion.experts import load_alone
 from fusion.journal import Journal
 from fusion.learner import Label
-from fusion.method import Alone
 from fusion.presets import method_named
 from fusion.record import RunWriter
 from fusion.requests import RequestDesk, RequestLine
@@ -32,8 +31,8 @@ Say = Callable[[str], None]
 
 def show_policy(args: argparse.Namespace, robot: RemoteRobot, publish: Publish, say: Say) -> int:
     """Let one policy drive until Ctrl-C."""
-    expert = load_expert(args.policy, robot.profile, args.experts or task_of(world_of(robot)))
-    method, journal, loop = Alone(expert.name, expert.act), Journal(publish=publish), ControlLoop(robot)
+    method = load_alone(args.policy, robot.profile, args.experts or task_of(world_of(robot)), ask=args.ask)
+    journal, loop = Journal(publish=publish), ControlLoop(robot)
     with stop_or_interrupt() as stop, request_line(robot, args) as line:
         desk = RequestDesk(line, loop, method, journal, say, restart=restarter(robot, args))
         loop.arm()

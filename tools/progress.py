@@ -10,6 +10,7 @@ import msgspec
 from fusion.record import LapRecord, Record, ResultRecord, RunRecord, StepRecord
 from hal.config import MALFORMED
 from hal.errors import StorageError
+from tools.proven import proof_words
 
 PHASES = {"train": "training lap", "prove": "proving run", "unseen": "unseen layout"}
 TTY_PERIOD_S = 0.1
@@ -91,6 +92,8 @@ def lap_line(lap: LapRecord) -> str:
     name = f"{PHASES.get(lap.phase, lap.phase)} {number}"
     words = f"{name:<16} {'passed' if lap.passed else 'failed'} {lap.duration_s:6.1f} s"
     words += f"  collisions {lap.collisions}, lost {lap.lost}"
+    if lap.stops:
+        words += f", stops to ask {lap.stops}"
     if lap.phase == "train":
         words += f"  human labels {lap.human_labels}, interventions {lap.interventions}, calls {lap.calls},"
         words += f" buffer {lap.buffer}, training steps {lap.training_steps}"
@@ -99,9 +102,8 @@ def lap_line(lap: LapRecord) -> str:
 
 def result_line(result: ResultRecord) -> str:
     """Say how the whole run ended."""
-    how = "converged" if result.converged else "did not converge (censored)"
     speed = f", {result.simulated_s / result.elapsed_s:.0f}x real time" if result.elapsed_s > 0 else ""
-    return f"{how} after {result.laps} training laps, {result.elapsed_s:.0f} s{speed}"
+    return f"{proof_words(result)}; {result.elapsed_s:.0f} s{speed}"
 
 
 class Display:

@@ -1,14 +1,13 @@
 """What a learning run leaves in its folder: every label, the record of its steps, and the novice."""
 
 import argparse
-import copy
 import shlex
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from dataclasses import replace
 from pathlib import Path
 
 from fusion.checkpoint import Checkpoint, save_checkpoint
-from fusion.ensemble import EnsembleNet
 from fusion.novice import Novice
 from fusion.presets import method_named
 from fusion.record import RunRecord
@@ -47,20 +46,28 @@ def snapshot(
 
     `sync` makes sure of the labels. The writing raises `StorageError`.
     """
-    labels, steps, network = novice.stored, novice.training_steps, copy.deepcopy(novice.network)
-    if isinstance(network, EnsembleNet):
-        network = network.novice()
+    labels, steps, network = novice.stored, novice.training_steps, novice.frozen()
+    doubtful = aside_words(novice.set_aside())
     sizes = profile.features.bins, profile.features.filters
-    about = Checkpoint("fusion", *sizes, profile.name, None, command(args), args.seed)
+    about = Checkpoint(network.kind, *sizes, profile.name, None, command(args), args.seed)
+    about = replace(about, labels=labels, training_steps=steps, examples=network.examples)
 
     def write() -> str:
         sync()
         if steps == 0:
             return f"saved {labels} labels in {folder}; there is no novice yet"
         save_checkpoint(folder / NOVICE, network, about)
-        return f"saved {labels} labels and the novice after {steps} training steps in {folder}"
+        return f"saved {labels} labels and the novice after {steps} training steps in {folder}{doubtful}"
 
     return write
+
+
+def aside_words(labels: Sequence[tuple[int, str]]) -> str:
+    """Which labels the novice does not believe, for whoever gave them to look at."""
+    if not labels:
+        return ""
+    names = ", ".join(f"{number} ({source})" for number, source in labels)
+    return f"; set aside, since the others contradict them, labels {names}"
 
 
 def command(args: argparse.Namespace) -> str:

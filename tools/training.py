@@ -17,9 +17,9 @@ from fusion.journal import Journal
 from fusion.learner import Learner
 from fusion.method import Alone
 from fusion.networks import CameraNet, LidarNet, Network
-from fusion.novice import LearningSettings, Novice
+from fusion.novice import LearningSettings, NetworkNovice
 from fusion.record import Record
-from fusion.session import Session
+from fusion.session import Same, Session
 from fusion.tasks import DEFAULT, TASKS
 from fusion.teacher import ScriptedTeacher
 from fusion.trainer import InlineTrainer
@@ -44,7 +44,7 @@ def train_expert(kind: Sensor, task: str, profile: RobotProfile, seed: int, path
     shape = profile.features
     network: Network
     network = CameraNet(shape.filters, seed=seed) if kind == "camera" else LidarNet(shape.bins, seed=seed)
-    novice = Novice(network, InlineTrainer(Learner(network, seed=seed, frozen_trunks=False)), LearningSettings())
+    novice = NetworkNovice(network, InlineTrainer(Learner(network, seed=seed, frozen_trunks=False)), LearningSettings())
     progress = Progress()
 
     def show(record: Record) -> None:
@@ -60,7 +60,7 @@ def train_expert(kind: Sensor, task: str, profile: RobotProfile, seed: int, path
         session = Session(robot, twin, loop, Journal(write=show), HgDagger(novice))
         loop.arm()
         with closing(ScriptedTeacher(Foresight(profile, world), profile, course.teacher, seed)) as teacher:
-            passed = session.teach(course.drives, teacher, course.laps)
+            passed = session.teach(Same(course.drives), teacher, course.laps)
     finally:
         robot.close()
     if passed:

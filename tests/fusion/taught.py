@@ -3,7 +3,7 @@
 import numpy as np
 
 from fusion.method import Expert
-from fusion.novice import LearningSettings, Novice
+from fusion.novice import LearningSettings, NetworkNovice
 from fusion.preprocess import Features
 
 FEATURES = Features(np.full(101, 0.9, np.float32), np.full((32, 32), 0.5, np.float32))
@@ -44,7 +44,7 @@ class Trainer:
 def make_novice(action=(0.9, -0.3), *, trained=True, **settings):
     """A novice that always does `action`, and its trainer."""
     trainer = Trainer()
-    novice = Novice(FixedNetwork(action), trainer, LearningSettings(**settings))
+    novice = NetworkNovice(FixedNetwork(action), trainer, LearningSettings(**settings))
     novice.training_steps = int(trained)
     return novice, trainer
 

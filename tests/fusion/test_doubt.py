@@ -60,7 +60,7 @@ def test_doubts_are_logged_once_per_take_over_and_only_when_there_was_something_
 def test_above_the_threshold_it_stands_and_asks_and_goes_on_when_it_is_sure():
     spread = [0.5]
     log = DoubtLog(lambda _: opinions(spread[0]))
-    alone = Doubtful(lambda _: (0.9, 0.1), log)
+    alone = Doubtful(lambda _: (0.9, 0.1), log.exceeds)
     assert alone.propose(FEATURES).choice.call is Call.NONE  # nobody ever took over
     log.take_over(FEATURES)
     assert alone.propose(FEATURES).command == (0.9, 0.1)  # as sure as then

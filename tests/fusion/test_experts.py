@@ -2,8 +2,11 @@ import numpy as np
 import pytest
 
 from fusion.checkpoint import Checkpoint, save_checkpoint
+from fusion.doubt import Doubtful
 from fusion.expert_files import folder_of
-from fusion.experts import as_expert, load_expert, load_network
+from fusion.experts import as_expert, load_alone, load_expert, load_network
+from fusion.kernel_net import KernelNet
+from fusion.method import Alone
 from fusion.networks import CameraNet, FusionNet, LidarNet
 from fusion.preprocess import Features
 from fusion.tasks import DEFAULT, TASKS, task_of
@@ -117,3 +120,16 @@ def test_an_expert_is_a_black_box_that_sees_both_sensors():
     network = FusionNet(101, 16, seed=3)
     assert as_expert("both", network, None).act(FEATURES) == network.act(FEATURES.scan, FEATURES.image)
     assert as_expert("both", network, None).cruise == (1.0, 0.0)
+
+
+def test_a_policy_that_cannot_tell_what_it_knows_cannot_ask():
+    assert load_alone("camera-expert", SIM).name == "camera"
+    with pytest.raises(ConfigError, match="cannot tell what it does not know"):
+        load_alone("camera-expert", SIM, ask=True)
+
+
+def test_a_novice_of_plus_can(tmp_path):
+    bins, filters = SIM.features.bins, SIM.features.filters
+    path = save(tmp_path / "novice.safetensors", "kernel", KernelNet(bins, filters), bins, filters, SIM.name)
+    assert isinstance(load_alone(path, SIM, ask=True), Doubtful)
+    assert isinstance(load_alone(path, SIM), Alone)

@@ -4,7 +4,7 @@ import pytest
 from fusion.hg_dagger import HgDagger
 from fusion.method import STAND, Call
 from fusion.networks import CameraNet
-from fusion.novice import LearningSettings, Novice
+from fusion.novice import LearningSettings, NetworkNovice
 from fusion.preprocess import Features
 
 FEATURES = Features(np.zeros(101, np.float32), np.zeros((32, 32), np.float32))
@@ -34,7 +34,7 @@ class Trainer:
 @pytest.fixture
 def method():
     network = CameraNet(16)
-    return HgDagger(Novice(network, Trainer(network), LearningSettings(labels_per_step=2)))
+    return HgDagger(NetworkNovice(network, Trainer(network), LearningSettings(labels_per_step=2)))
 
 
 def train(method):

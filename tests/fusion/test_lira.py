@@ -8,7 +8,7 @@ import pytest
 from fusion.ledger import Ledger
 from fusion.lira import PRESETS, LiraSettings, LiraSpf, activation, choose, in_consensus
 from fusion.method import Call, Expert
-from fusion.novice import LearningSettings, Novice, is_redundant
+from fusion.novice import LearningSettings, NetworkNovice, is_redundant
 from fusion.preprocess import Features
 from hal.messages import ExpertView
 
@@ -127,7 +127,7 @@ class FixedNetwork:
 
 
 def make_novice(*, trained=True, **settings):
-    novice = Novice(FixedNetwork(), NoTrainer(), LearningSettings(**settings))
+    novice = NetworkNovice(FixedNetwork(), NoTrainer(), LearningSettings(**settings))
     novice.training_steps = int(trained)
     return novice
 

@@ -1,5 +1,7 @@
 """The planner on the twin's own drive model: which way it goes around a box, and that it never goes into one."""
 
+import math
+
 import numpy as np
 import pytest
 
@@ -75,6 +77,42 @@ def test_beside_the_line_it_goes_back_to_it(style):
 def test_on_a_free_line_it_goes_straight_at_full_speed(style):
     planner = Planner(Foresight(PROFILE, world()), style, PERIOD_S, follow_line=True)
     assert planner.plan(drive(world(), style, Episode(), 0.0)[0]) == pytest.approx((1.0, 0.0))
+
+
+BEND = World(
+    description="a line that bends",
+    line=Line(pieces=(Piece(straight_m=8.0), Piece(radius_m=3.0, angle_deg=60.0), Piece(straight_m=20.0))),
+    box=(Box(x_m=5.0, y_m=0.1),),
+    limits=Limits(lost_m=3.0, finish_m=30.0),
+)
+
+
+@pytest.mark.parametrize("style", STYLES)
+@pytest.mark.parametrize("start_m", [3.5, 9.0])
+@pytest.mark.parametrize("lateral_m", [-0.4, 0.0, 0.3])
+@pytest.mark.parametrize("yaw_rad", [-2.8, -2.0, -1.2, 1.6, 2.4, math.pi])
+def test_whichever_way_it_looks_it_comes_round_and_never_drives_the_line_backwards(style, start_m, lateral_m, yaw_rad):
+    states = drive(BEND, style, Episode(start_m=start_m, lateral_m=lateral_m, yaw_rad=yaw_rad))
+    progress_m = [state.progress_m for state in states]
+    assert not any(state.collided for state in states)
+    assert min(progress_m) > start_m - 1.5  # the room to turn round in
+    assert progress_m[-1] > start_m + 2.0
+    assert abs(states[-1].lateral_m) < 0.5
+
+
+@pytest.mark.parametrize("style", STYLES)
+@pytest.mark.parametrize("yaw_rad", [-3.0, -1.9, 1.9, math.pi])
+def test_on_the_spot_it_turns_one_way(style, yaw_rad):
+    planner = Planner(Foresight(PROFILE, BEND), style, PERIOD_S, follow_line=True)
+    twin = Twin(PROFILE, BEND)
+    twin.reset(Episode(start_m=4.0, yaw_rad=yaw_rad))
+    turns = []
+    for _ in range(20):
+        action = planner.plan(twin.state())
+        turns += [np.sign(action[1])] if action[0] < 0.5 else []
+        twin.drive(Command(to_twist(action, PROFILE.base), twin.now()))
+        twin.wait(twin.now() + PERIOD_S)
+    assert len(set(turns)) <= 1
 
 
 def test_between_two_boxes_it_takes_the_gap():

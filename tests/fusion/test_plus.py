@@ -1,16 +1,13 @@
-"""What `plus` adds to Algorithm 1: pre-fill, reservation, the wheel to an expert, the memory of resolved calls."""
+"""What `plus` adds to Algorithm 1: pre-fill, reservation, the wheel to an expert, and no call where it is sure."""
 
-import msgspec
 import numpy as np
 import pytest
 
-from fusion.doubt import DoubtLog
 from fusion.journal import Journal
 from fusion.lira import LiraSettings, LiraSpf
-from fusion.memory import NEIGHBOUR, Memory
 from fusion.method import Call, Chooser, Expert
 from fusion.networks import FusionNet
-from fusion.novice import LearningSettings, Novice
+from fusion.novice import LearningSettings, NetworkNovice
 from fusion.plus import LiraPlus, PlusSettings
 from fusion.preprocess import Features
 
@@ -18,7 +15,7 @@ PERIOD_S = 0.2
 BINS = 101
 NETWORK = FusionNet(BINS, 16, seed=3)
 CRUISE, LEFT, RIGHT = (1.0, 0.0), (1.0, 0.8), (1.0, -0.8)
-BARE = PlusSettings(prefill=0, reserve_s=0.0, wheel_s=0.0, at_once=0, recall=None, sure=None)
+BARE = PlusSettings(prefill=0, reserve_s=0.0, wheel_s=0.0, sure=None)
 
 
 def seen(brightness=0.5, nearness=1.0):
@@ -26,14 +23,6 @@ def seen(brightness=0.5, nearness=1.0):
     scan = np.full(BINS, nearness, np.float32) * rng.uniform(0.99, 1.0, BINS).astype(np.float32)
     image = np.full((32, 32), brightness, np.float32) * rng.uniform(0.99, 1.0, (32, 32)).astype(np.float32)
     return Features(scan, image)
-
-
-def elsewhere():
-    """Return something that looks quite different: half of it bright, half of it near."""
-    features = seen()
-    features.scan[: BINS // 2] = 0.1
-    features.image[:, :16] = 0.0
-    return features
 
 
 class Shelf:
@@ -61,13 +50,13 @@ class Shelf:
 class Scene:
     """A method with two experts that do as they are told, and the labels it has stored."""
 
-    def __init__(self, settings, *, trained=True, log=None, **learning):
+    def __init__(self, settings, *, trained=True, **learning):
         self.camera, self.lidar = CRUISE, CRUISE
         self.shelf = Shelf()
-        self.novice = Novice(NETWORK, self.shelf, LearningSettings(**learning))
+        self.novice = NetworkNovice(NETWORK, self.shelf, LearningSettings(**learning))
         self.novice.training_steps = int(trained)
         experts = [Expert("camera", lambda _: self.camera), Expert("lidar", lambda _: self.lidar)]
-        self.method = LiraPlus(experts, self.novice, settings, PERIOD_S, log)
+        self.method = LiraPlus(experts, self.novice, settings, PERIOD_S)
 
     def step(self, human=None, features=None):
         proposal = self.method.propose(features or seen())
@@ -95,7 +84,7 @@ def test_with_everything_off_it_is_lira():
 
 class TestPrefill:
     def scene(self):
-        return Scene(PlusSettings(prefill=8, reserve_s=0.0, recall=None), trained=False)
+        return Scene(PlusSettings(prefill=8, reserve_s=0.0), trained=False)
 
     def test_the_first_expert_drives_and_teaches_while_nobody_else_is_active(self):
         scene = self.scene()
@@ -130,7 +119,7 @@ class TestPrefill:
 
 class TestReservation:
     def scene(self):
-        scene = Scene(PlusSettings(prefill=0, wheel_s=0.0, recall=None))
+        scene = Scene(PlusSettings(prefill=0, wheel_s=0.0))
         scene.warm()
         scene.camera = LEFT
         return scene
@@ -178,7 +167,7 @@ def taken():
 
 class TestWheel:
     def scene(self):
-        scene = Scene(PlusSettings(prefill=0, reserve_s=0.0, recall=None, wheel_s=0.6))
+        scene = Scene(PlusSettings(prefill=0, reserve_s=0.0, wheel_s=0.6))
         scene.warm()
         return scene
 
@@ -222,73 +211,20 @@ def test_the_human_s_labels_weigh_more():
     assert [(label.source, label.weight) for label in scene.shelf.labels] == [("camera", 1.0), ("human", 3.0)]
 
 
-@pytest.mark.parametrize("at_once", [2, 0])
-def test_what_the_human_has_shown_is_learned_as_soon_as_the_hand_is_off(at_once):
-    scene = Scene(msgspec.structs.replace(BARE, at_once=at_once))
-    for human in (LEFT, LEFT, None, None, None, None):
-        scene.step(human=human)
-        scene.novice.update(0.0)
-    assert len(scene.shelf.labels) == 2
-    assert scene.shelf.steps == at_once
+@pytest.mark.parametrize(("knows", "call"), [(True, Call.NONE), (False, Call.FEEDBACK)])
+def test_where_the_experts_disagree_nobody_is_called_if_the_novice_knows(knows, call):
+    scene = Scene(PlusSettings(prefill=0, reserve_s=0.0, wheel_s=0.0, sure=0.25))
+    scene.novice.knows = lambda _, share: knows and share == 0.25
+    scene.warm()
+    scene.camera, scene.lidar = LEFT, RIGHT
+    proposal, lesson = scene.step()
+    assert (proposal.choice.driver, proposal.choice.call) == ("novice", call)
+    assert proposal.speed == (1.0 if call is Call.NONE else 0.3)
+    assert not lesson.stored
 
 
-class TestMemory:
-    def memory(self, interventions=4, states=4):
-        memory = Memory(NETWORK, 0.9)
-        for k in range(interventions):
-            for j in range(states):
-                memory.add(seen(0.5 + 0.001 * k, 0.4 + 0.001 * j))
-            memory.end()
-        return memory
-
-    def test_what_looks_like_several_resolved_states_is_known_and_what_does_not_is_not(self):
-        memory = self.memory()
-        assert len(memory) == 16
-        assert memory.knows(seen(0.5005, 0.4005))
-        assert not memory.knows(elsewhere())
-
-    def test_one_intervention_tells_nothing_about_another(self):
-        assert not self.memory(interventions=1, states=2 * NEIGHBOUR).knows(seen(0.5, 0.4))
-
-    def test_a_call_that_was_answered_before_is_not_made_again(self):
-        scene = Scene(PlusSettings(prefill=0, reserve_s=0.0, wheel_s=0.0))
-        scene.warm()
-        scene.camera, scene.lidar = LEFT, RIGHT
-        assert scene.step()[0].choice.call is Call.FEEDBACK
-        for k in range(4):
-            for j in range(4):
-                scene.step(human=LEFT, features=seen(0.5 + 0.001 * k, 0.4 + 0.001 * j))
-            scene.camera = CRUISE
-            scene.lidar = CRUISE
-            scene.step(features=seen(0.9, 0.9))
-            scene.camera, scene.lidar = LEFT, RIGHT
-        known, _ = scene.step(features=seen(0.5005, 0.4005))
-        assert (known.choice.driver, known.choice.call, known.speed) == ("novice", Call.NONE, 1.0)
-        assert scene.step(features=elsewhere())[0].choice.call is Call.FEEDBACK
-
-
-class TestConfidence:
-    def scene(self, take_overs):
-        """Return a scene whose ensemble disagrees as much as `spread` says: 0.5 whenever the human takes over."""
-        self.spread = 0.5
-        log = DoubtLog(lambda _: np.array([[1.0, -self.spread], [1.0, self.spread]], np.float32))
-        scene = Scene(PlusSettings(prefill=0, reserve_s=0.0, wheel_s=0.0, recall=None, sure=0.25), log=log)
-        scene.warm()
-        for _ in range(take_overs):
-            scene.step(human=LEFT)
-            scene.step()
-        scene.camera, scene.lidar = LEFT, RIGHT
-        return scene
-
-    def test_a_novice_that_is_sure_drives_and_nobody_is_called(self):
-        scene = self.scene(take_overs=4)
-        assert scene.step()[0].choice.call is Call.FEEDBACK
-        self.spread = 0.1
-        proposal, lesson = scene.step()
-        assert (proposal.choice.driver, proposal.choice.call, proposal.speed) == ("novice", Call.NONE, 1.0)
-        assert not lesson.stored
-
-    def test_it_takes_some_take_overs_to_tell(self):
-        scene = self.scene(take_overs=3)
-        self.spread = 0.1
-        assert scene.step()[0].choice.call is Call.FEEDBACK
+def test_a_novice_that_cannot_tell_is_never_sure():
+    scene = Scene(PlusSettings(prefill=0, reserve_s=0.0, wheel_s=0.0, sure=1.0))
+    scene.warm()
+    scene.camera, scene.lidar = LEFT, RIGHT
+    assert scene.step()[0].choice.call is Call.FEEDBACK

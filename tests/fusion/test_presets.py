@@ -4,6 +4,7 @@ import pytest
 from fusion.hg_dagger import HgDaggerSettings
 from fusion.lira import LiraSettings
 from fusion.presets import ALIASES, METHODS, Method, method_named
+from fusion.syllabus import FRESH
 from hal.errors import ConfigError
 
 
@@ -33,8 +34,28 @@ def test_what_is_beyond_a_method_is_off_unless_its_name_says_so():
 
 def test_only_who_has_experts_begins_with_their_trunks():
     frozen = {name for name, method in METHODS.items() if method.trunks == "frozen"}
-    alone = {"hg-dagger", "hg-dagger-m10", "hg-dagger-mirrored", "hg-dagger-doubt", "cloning", "hold-scratch"}
+    alone = {
+        "hg-dagger",
+        "hg-dagger-fresh",
+        "hg-dagger-m10",
+        "hg-dagger-mirrored",
+        "hg-dagger-doubt",
+        "cloning",
+        "hold-scratch",
+    }
     assert frozen == set(METHODS) - alone
+
+
+def test_only_plus_and_what_is_named_so_is_taught_and_proven_on_fresh_layouts():
+    for name, method in METHODS.items():
+        fresh = name.startswith("plus") or name.endswith(("-fresh", "-kernel"))
+        assert (method.syllabus == FRESH) == (fresh and name != "plus-own"), name
+
+
+def test_who_learns_by_a_kernel_says_so_and_sees_as_the_experts_do():
+    named = {name for name in METHODS if name.startswith("plus") or name.endswith("-kernel")} - {"plus-network"}
+    assert {name for name, method in METHODS.items() if method.kernel is not None} == named
+    assert all(METHODS[name].trunks == "frozen" and not METHODS[name].warm for name in named)
 
 
 def test_an_unknown_name_lists_the_known_ones():

@@ -9,7 +9,7 @@ from fusion.control import ControlLoop
 from fusion.journal import Journal
 from fusion.method import Call, Choice, Lesson, Proposal
 from fusion.record import LapRecord
-from fusion.session import LOST_OBSERVATIONS, PUT_BACK_M, PUT_ON_M, Drive, Session
+from fusion.session import LOST_OBSERVATIONS, PUT_BACK_M, PUT_ON_M, Drive, Same, Session
 from hal.errors import DeviceError
 from hal.governed import GovernedRobot
 from hal.messages import Episode
@@ -64,6 +64,8 @@ class Mind:
     def act(self, features):
         return self.action
 
+    alone = act
+
 
 class Pupil:
     """A method whose novice drives, and counts what the human does."""
@@ -117,10 +119,62 @@ def school(track, pupil=None):
     return session, lambda: [record for record in records if isinstance(record, LapRecord)]
 
 
+class Fresh:
+    """A layout for each training lap, and `proofs` others to prove it, of which `spare` may fail."""
+
+    def __init__(self, proofs, spare=0):
+        self.proofs, self.spare = proofs, spare
+
+    def taught(self, number):
+        return [Drive(Episode(10 * number), NEVER_S)]
+
+    def proven(self, number):
+        return [[Drive(Episode(10 * number + 1 + k), NEVER_S)] for k in range(self.proofs)]
+
+
+@pytest.fixture
+def walled():
+    """A track with a wall on these layouts."""
+
+    def make(*layouts):
+        track = Track()
+        reset = track.reset
+
+        def put_down(episode):
+            reset(episode)
+            track.walls = [2.0] if episode.layout in layouts else []
+
+        track.reset = put_down
+        return track
+
+    return make
+
+
+def test_several_proving_runs_have_to_be_passed_in_a_row_and_the_first_failure_ends_them(walled):
+    session, laps = school(walled(11, 22))
+    assert session.teach(Fresh(3), Hand(), 5)
+    assert [(lap.phase, lap.lap, lap.layout, lap.passed) for lap in laps()] == [
+        ("train", 1, 10, True),
+        ("prove", 1, 11, False),
+        ("train", 2, 20, True),
+        ("prove", 2, 21, True),
+        ("prove", 2, 22, False),
+        ("train", 3, 30, True),
+        *[("prove", 3, layout, True) for layout in (31, 32, 33)],
+    ]
+
+
+def test_so_many_proving_runs_may_fail(walled):
+    session, laps = school(walled(11, 12, 22))
+    assert session.teach(Fresh(3, spare=1), Hand(), 5)
+    proofs = [(lap.layout, lap.passed) for lap in laps() if lap.phase == "prove"]
+    assert proofs == [(11, False), (12, False), (21, True), (22, False), (23, True)]
+
+
 def test_a_lap_and_a_proving_run_on_the_same_drive_end_the_teaching():
     track, hand = Track(), Hand()
     session, laps = school(track)
-    assert session.teach([Drive(Episode(3), NEVER_S)], hand, 5)
+    assert session.teach(Same([Drive(Episode(3), NEVER_S)]), hand, 5)
     assert [(lap.phase, lap.lap, lap.layout, lap.passed, lap.unassisted) for lap in laps()] == [
         ("train", 1, 3, True, False),
         ("prove", 1, 3, True, True),
@@ -131,14 +185,14 @@ def test_a_lap_and_a_proving_run_on_the_same_drive_end_the_teaching():
 
 def test_a_novice_without_a_training_step_proves_nothing():
     session, laps = school(Track(), Pupil(after=3))
-    assert session.teach([Drive(Episode(), NEVER_S)], Hand(), 5)
+    assert session.teach(Same([Drive(Episode(), NEVER_S)]), Hand(), 5)
     assert [lap.phase for lap in laps()] == ["train", "train", "train", "prove"]
 
 
 def test_after_a_crash_in_training_it_starts_again_before_it():
     track, hand = Track(walls=[3.0]), Hand(steps=0)
     session, laps = school(track, pupil := Pupil())
-    session.teach([Drive(Episode(), NEVER_S)], hand, 1)
+    session.teach(Same([Drive(Episode(), NEVER_S)]), hand, 1)
     first, again = track.episodes
     assert first == Episode()
     assert again.start_m == pytest.approx(3.0 - PUT_BACK_M, abs=1.5 * STEP_M)
@@ -153,7 +207,7 @@ def test_after_a_crash_in_training_it_starts_again_before_it():
 def test_a_crash_near_the_start_starts_at_the_start():
     track = Track(walls=[0.5])
     session, _ = school(track)
-    session.teach([Drive(Episode(), NEVER_S)], Hand(), 1)
+    session.teach(Same([Drive(Episode(), NEVER_S)]), Hand(), 1)
     assert track.episodes[1] == Episode(start_m=0.0, began_m=0.0)
 
 
@@ -161,7 +215,7 @@ def test_a_world_without_a_line_is_started_all_over():
     track = Track(walls=[3.0], line=False)
     session, laps = school(track)
     drive = Drive(Episode(2, lateral_m=0.1), NEVER_S)
-    session.teach([drive], Hand(), 1)
+    session.teach(Same([drive]), Hand(), 1)
     assert track.episodes[:2] == [drive.episode] * 2
     assert laps()[0].lateral_rms_m is None
 
@@ -169,7 +223,7 @@ def test_a_world_without_a_line_is_started_all_over():
 def test_a_proving_run_ends_at_the_first_harm():
     track = Track(walls=[1.0] * 50)
     session, laps = school(track)
-    assert not session.teach([Drive(Episode(layout), 3.0) for layout in (0, 1)], Hand(), 1)
+    assert not session.teach(Same([Drive(Episode(layout), 3.0) for layout in (0, 1)]), Hand(), 1)
     train, prove = laps()
     assert train.collisions > 2
     assert (prove.collisions, prove.passed) == (1, False)
@@ -179,7 +233,7 @@ def test_a_proving_run_ends_at_the_first_harm():
 
 def test_a_run_that_meets_its_cap_is_reported_as_such():
     session, laps = school(Track(), Pupil(action=(0.1, 0.0)))
-    assert not session.teach([Drive(Episode(), 2.0)], Hand(), 3)
+    assert not session.teach(Same([Drive(Episode(), 2.0)]), Hand(), 3)
     assert [lap.phase for lap in laps()] == ["train", "prove"] * 3
     assert not any(lap.passed for lap in laps())
     result = session.result(converged=False)
@@ -322,7 +376,7 @@ def in_doubt(track):
 
 def test_a_stop_in_doubt_ends_a_proving_run_for_nobody_is_there_to_answer():
     session, records = in_doubt(track := Track())
-    assert session.prove([Drive(Episode(), NEVER_S)]) is False
+    assert session.prove(Same([Drive(Episode(), NEVER_S)])) is False
     lap = records[-1]
     assert (lap.stops, lap.collisions, lap.passed, lap.training_steps) == (1, 0, False, 0)
     assert 1.0 < track.state().x_m < 2.0
@@ -339,4 +393,4 @@ def test_on_an_unseen_layout_the_teacher_answers_and_the_stop_is_counted():
 def test_without_an_apprentice_nobody_can_be_taught():
     session, _ = in_doubt(Track())
     with pytest.raises(ValueError, match="nobody to teach"):
-        session.teach([Drive(Episode(), NEVER_S)], Hand(steps=0), 1)
+        session.teach(Same([Drive(Episode(), NEVER_S)]), Hand(steps=0), 1)

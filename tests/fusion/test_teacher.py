@@ -32,6 +32,7 @@ class Futures:
     clearance_m: np.ndarray
     lateral_m: np.ndarray
     heading_error_rad: np.ndarray
+    progress_m: np.ndarray
 
 
 class Crystal:
@@ -49,7 +50,7 @@ class Crystal:
 
     def imagine(self, state, actions, period_s):
         lateral = 3.0 - np.cumsum(actions[:, :, 1], axis=1) * period_s
-        return Futures(np.full(lateral.shape, 1.0), lateral, np.zeros(lateral.shape))
+        return Futures(np.full(lateral.shape, 1.0), lateral, np.zeros(lateral.shape), np.zeros(lateral.shape))
 
 
 def at(step):
@@ -92,6 +93,12 @@ def test_it_lets_go_at_once_when_the_method_asks_for_the_wheel(crystal):
     assert drive(hand, crystal, "xx") == "HH"
     assert drive(hand, crystal, "x", replace(QUIET, relieves=True)) == "-"
     assert drive(hand, crystal, "x") == "H"  # and takes over again if that went wrong
+
+
+def test_a_hand_that_does_not_get_anywhere_gives_up_and_has_to_see_the_danger_anew(crystal):
+    held = drive(teacher(crystal, delay_s=0.0, longest_s=2.0), crystal, "x" * 30)
+    assert max(map(len, held.split("-"))) == 10  # steps of 0.2 s
+    assert held.startswith("H" * 10 + "-H")
 
 
 def test_safe_steps_are_a_setting(crystal):

@@ -34,13 +34,13 @@ def parts(*codes):
     ]
 
 
-def learner(folder, *, converged=True):
+def learner(folder, *, converged=True, unseen=1):
     """Return the command of a process that writes a whole run."""
     code = f"""
 import sys, pathlib
 sys.path.insert(0, {str(HERE)!r})
 from synthetic_run import write_run
-write_run(pathlib.Path({str(folder)!r}), unseen=1, converged={converged})
+write_run(pathlib.Path({str(folder)!r}), unseen={unseen}, converged={converged})
 """
     return python(code)
 
@@ -52,19 +52,27 @@ def _keep_signals():
     signal.signal(signal.SIGTERM, before)
 
 
-def test_a_run_that_converges_exits_0_with_its_report(tmp_path, capsys):
+def test_a_run_that_is_proven_and_passes_what_it_is_shown_exits_0_with_its_report(tmp_path, capsys):
     assert demo.supervise(parts(TWIN), learner(tmp_path), tmp_path) == 0
     out = capsys.readouterr().out
     assert out.startswith("twin 'x' serves world")
-    assert "alone on unseen layouts: 1 of 1 passed, 0 collisions" in out
+    assert "alone it passed 1 of 1 unseen layouts; 95 %: 3 to 100 %; collisions: 0, lost lines: 0" in out
+    assert "proven after 2 training laps" in out
     assert out.splitlines()[-1] == f"report: {tmp_path / 'report.html'}"
     assert (tmp_path / "report.html").exists()
 
 
 def test_a_run_that_does_not_converge_exits_1_and_still_reports(tmp_path, capsys):
     assert demo.supervise(parts(TWIN), learner(tmp_path, converged=False), tmp_path) == 1
-    assert "did not pass its proving run" in capsys.readouterr().out
+    assert "not proven within 2 training laps: the novice alone did not pass" in capsys.readouterr().out
     assert (tmp_path / "report.html").exists()
+
+
+def test_a_novice_that_is_proven_and_then_crashes_is_not_praised_for_it(tmp_path, capsys):
+    assert demo.supervise(parts(TWIN), learner(tmp_path, unseen=3), tmp_path) == 1
+    out = capsys.readouterr().out
+    assert "alone it passed 2 of 3 unseen layouts; 95 %: 9 to 99 %; collisions: 1, lost lines: 0" in out
+    assert "drives alone" not in out
 
 
 def test_a_twin_that_dies_is_named_and_quoted(tmp_path):

@@ -56,4 +56,4 @@ def test_a_scripted_lesson_is_told_lap_by_lap(fusion, tmp_path):
     assert lines[0].startswith("hg-dagger (hg-dagger) on ")
     assert [line.split()[0] for line in lines[1:3]] == ["training", "proving"]
     assert any(line.startswith("saved ") and "the novice after" in line for line in lines)
-    assert "after 1 training laps" in lines[-1]
+    assert "1 training lap: the novice alone" in lines[-1]

@@ -176,6 +176,12 @@ def test_words_that_make_no_sense_are_refused_with_the_usage(capsys, words):
     assert f"usage: lira {words[0]}" in capsys.readouterr().err
 
 
+def test_the_demo_refuses_what_is_no_proof_before_it_starts_anything(refused):
+    what, remedy = refused("demo", "--proof", "fresh")
+    assert what == "lira demo: 'fresh' is no proof"
+    assert "fresh:3" in remedy
+
+
 @pytest.mark.parametrize("option", ["world", "profile"])
 def test_the_demo_refuses_an_unknown_world_and_profile_before_it_starts_anything(refused, option):
     what, remedy = refused("demo", f"--{option}", "nosuch")

@@ -7,7 +7,10 @@ from fusion.presets import METHODS
 from fusion.teacher import PERFECT
 from tools.experiments.trial import Trial, play
 
-KINDS = ("hold-fixed", "hold-scratch", "hold-mirrored", "hg-dagger-warm", "hg-dagger-doubt", "cloning", "switching")
+KINDS = (
+    *("hold-fixed", "hold-scratch", "hold-mirrored", "hg-dagger-warm", "hg-dagger-doubt", "cloning", "switching"),
+    *("plus", "plus-ask", "hg-dagger-kernel"),
+)
 
 
 @pytest.fixture(scope="module")
@@ -47,3 +50,16 @@ def test_cloning_is_the_humans_drive_alone_trained_at_the_end_of_the_lap(outcome
 def test_a_warm_start_trains_before_the_human_comes(outcomes):
     assert outcomes["hg-dagger-warm"].result.demonstration == 0
     assert outcomes["hg-dagger-warm"].result.training_steps > outcomes["hg-dagger-warm"].result.buffer // 30
+
+
+def test_who_learns_from_every_label_counts_as_many_training_steps_as_labels(outcomes):
+    for name in ("plus", "hg-dagger-kernel"):
+        assert outcomes[name].result.training_steps == outcomes[name].result.buffer
+        assert outcomes[name].result.proof == "fresh:3"
+
+
+def test_plus_is_proven_on_layouts_that_it_was_not_taught(outcomes):
+    layouts = {
+        phase: {lap.layout for lap in outcomes["plus"].laps if lap.phase == phase} for phase in ("train", "prove")
+    }
+    assert not layouts["train"] & layouts["prove"]

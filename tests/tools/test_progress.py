@@ -47,7 +47,7 @@ def test_every_lap_and_the_end_leave_a_line(run_file):
     assert lines[1].startswith("training lap 1   passed")
     assert lines[2].startswith("proving run 1    failed")
     assert "collisions 1, lost 0" in lines[2]
-    assert lines[-1].startswith("converged after 2 training laps")
+    assert lines[-1].startswith("proven after 2 training laps: the novice alone passed the layout it was taught on; ")
     assert watch.result is not None
     assert watch.result.converged
 

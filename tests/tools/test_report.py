@@ -84,8 +84,8 @@ def test_words_from_the_run_are_escaped(page_text):
 
 
 def test_the_outcome_and_the_unseen_collisions_are_told(page_text):
-    assert "Converged after 2 training laps" in page_text
-    assert "2 of 3 passed (collisions: 1, lost lines: 0)" in page_text
+    assert "Proven after 2 training laps: the novice alone passed the layout it was taught on" in page_text
+    assert "passed 2 of 3 unseen layouts; 95 %: 9 to 99 %; collisions: 1, lost lines: 0" in page_text
 
 
 def test_a_run_that_was_cut_off_still_gives_a_page(tmp_path):

@@ -12,7 +12,7 @@ from fusion.learner import Learner
 from fusion.lira import PRESETS, LiraSpf
 from fusion.method import Expert
 from fusion.networks import FusionNet
-from fusion.novice import LearningSettings, Novice
+from fusion.novice import LearningSettings, NetworkNovice
 from fusion.record import RunRecord, RunWriter, read_run
 from fusion.trainer import InlineTrainer
 from hal.governed import GovernedRobot
@@ -37,7 +37,7 @@ def record(tmp_path_factory):
     path = tmp_path_factory.mktemp("three") / "run.jsonl"
     experts = [load_expert("camera-expert", PROFILE), load_expert("lidar-expert", PROFILE), Expert("wall", wall)]
     network = FusionNet(PROFILE.features.bins, PROFILE.features.filters)
-    novice = Novice(network, InlineTrainer(Learner(network, seed=0, frozen_trunks=False)), LearningSettings())
+    novice = NetworkNovice(network, InlineTrainer(Learner(network, seed=0, frozen_trunks=False)), LearningSettings())
     novice.training_steps = 1
     method = LiraSpf(experts, novice, PRESETS["hold"], PROFILE.period_s)
     twin = Twin(PROFILE, "line-obstacles", renderer="tiny")

@@ -10,7 +10,7 @@ from tools.experiments.trial import Outcome, Trial
 WORLD = "line-obstacles"
 PAIRS = ("line@1", "line@2", "line@3")
 BASE = "plus"
-NAMES = tuple(name for name in METHODS if name.startswith(BASE))
+NAMES = (BASE, *(name for name in METHODS if name.startswith("plus-no-")), "plus-network", "plus-own")
 QUANTITIES = ("human_labels", "interventions")
 
 

@@ -57,7 +57,8 @@ class Experiment:
     """The same shape for every experiment. All but `trials` are pure functions of the outcomes.
 
     `trials(seeds)` lists what is run for seeds 0, 1, ... `seeds - 1`. `ratios` are rows of `method`, `against`,
-    `quantity`, `median`, `low`, `high`, `n`, `censored`, for experiments that compare methods pair by pair.
+    `quantity`, `median`, `low`, `high`, `n`, `censored`, for experiments that compare methods pair by pair, and
+    `quality` rows of `method`, `pair`, effort and unseen laps passed, for those that ask how good the novices are.
     `methods` are those of which some may be played alone, and `usual` those that are if nothing is said; none where
     only all together say something.
     """
@@ -67,5 +68,6 @@ class Experiment:
     findings: Callable[[Outcomes], list[Finding]]
     figures: Callable[[Outcomes], list[Picture]] = lambda _: []
     ratios: Callable[[Outcomes], list[Row]] = lambda _: []
+    quality: Callable[[Outcomes], list[Row]] = lambda _: []
     methods: tuple[str, ...] = ()
     usual: tuple[str, ...] = ()

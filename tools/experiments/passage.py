@@ -12,7 +12,7 @@ from fusion.journal import Journal
 from fusion.method import Alone
 from fusion.presets import METHODS
 from fusion.record import LapRecord
-from fusion.session import Session
+from fusion.session import Same, Session
 from hal.governed import GovernedRobot
 from sim_backend.twin import Twin
 from tools.assembly import lap
@@ -45,7 +45,7 @@ def alone(name: Sensor, trial: Trial) -> tuple[LapRecord, Track]:
         journal = Journal(write=notes.record)
         session = Session(robot, twin, loop, journal, None, lambda _: Alone(name, expert.act))
         loop.arm()
-        session.prove([lap(trial.profile, twin.world, 0)])
+        session.prove(Same([lap(trial.profile, twin.world, 0)]))
     finally:
         robot.close()
     return notes.laps[0], notes.tracks[0]

@@ -12,8 +12,9 @@ from tools.experiments.experiment import Experiment, Finding, Outcomes, Row, Tab
 MOST_BYTES = 2**24
 
 
-class Summary(msgspec.Struct, frozen=True):
+class Summary(msgspec.Struct, frozen=True, omit_defaults=True):
     """An experiment's numbers. `results` are the rows of its first table, `ratios` empty where nothing is paired.
+    `quality` is there where an experiment tells how good the novices are on layouts they have not seen.
 
     `fingerprints` says with which code and experts the trials were played: one for each pair of experts.
     """
@@ -29,6 +30,7 @@ class Summary(msgspec.Struct, frozen=True):
     ratios: list[Row]
     tables: list[Table]
     findings: list[Finding]
+    quality: list[Row] = []
 
 
 def summarise(name: str, words: str, command: str, seeds: int, experiment: Experiment, outcomes: Outcomes) -> Summary:
@@ -46,6 +48,7 @@ def summarise(name: str, words: str, command: str, seeds: int, experiment: Exper
         ratios=experiment.ratios(outcomes),
         tables=tables,
         findings=experiment.findings(outcomes),
+        quality=experiment.quality(outcomes),
     )
 
 

@@ -20,7 +20,7 @@ from hal.profile import RobotProfile, load_profile
 from sim_backend.catalogue import load_world
 from sim_backend.foresight import sketching
 from sim_backend.twin import Twin
-from tools.assembly import crew, lap, teacher
+from tools.assembly import Course, crew, teacher
 from tools.experiments.notes import Notes, Track
 
 UNSEEN = 1000  # layouts from here on belong to nobody's training
@@ -95,15 +95,16 @@ def play(trial: Trial) -> Outcome:
         loop = ControlLoop(robot, truth=twin.state)
         session = Session(robot, twin, loop, Journal(keep=notes.label, write=notes.record), team.pupil, team.alone)
         loop.arm()
-        course = [lap(profile, world, trial.seed)]
-        unseen = [lap(profile, world, UNSEEN + trial.seed * trial.unseen + k) for k in range(trial.unseen)]
+        course = Course(profile, world, trial.seed, trial.method.syllabus)
+        unseen = course.unseen(UNSEEN + trial.seed * trial.unseen, trial.unseen)
         with closing(teacher(trial.skill, profile, world, trial.seed, trial.seed)) as hand:
             if team.pupil is None:
                 converged = session.prove(course)
             else:
                 converged = session.teach(course, hand, trial.laps, all_laps=trial.all_laps)
             session.show(unseen, hand if team.answered else None)
-        return Outcome(trial, tuple(notes.laps), session.result(converged), notes.labels, notes.tracks)
+        result = session.result(converged, trial.method.syllabus.proof)
+        return Outcome(trial, tuple(notes.laps), result, notes.labels, notes.tracks)
     finally:
         team.close()
         robot.close()

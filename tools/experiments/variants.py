@@ -12,6 +12,7 @@ QUANTITIES = ("human_labels", "interventions")
 # Base -> what differs from it in one thing.
 VARIANTS = {
     "hold": ("hold-mirrored",),
+    "plus": ("plus-ask", "plus-sure"),
     "hg-dagger": ("hg-dagger-trunks", "hg-dagger-mirrored", "hg-dagger-doubt"),
 }
 

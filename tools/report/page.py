@@ -9,6 +9,7 @@ from importlib import resources
 import cv2
 import numpy as np
 
+from tools.proven import proof_words, unseen_words
 from tools.report import plots
 from tools.report.course import course
 from tools.report.digest import Lap, Run
@@ -53,9 +54,8 @@ def head(run: Run, title: str) -> str:
     parts.append(f'<dl class="tiles">{"".join(map(tile, figures(run)))}</dl>')
     unseen = [lap.record for lap in run.phase("unseen") if lap.record]
     if unseen:
-        passed = sum(record.passed for record in unseen)
-        harm = f"collisions: {sum(r.collisions for r in unseen)}, lost lines: {sum(r.lost for r in unseen)}"
-        parts.append(f"<p>The novice alone on layouts it has not seen: {passed} of {len(unseen)} passed ({harm}).</p>")
+        words = unseen_words(unseen)
+        parts.append(f"<p>{words[0].upper()}{words[1:]}.</p>")
     if run.head:
         parts.append(f"<p>To repeat it:</p><pre>{escape(run.head.command)}</pre>")
     return "".join(parts)
@@ -65,10 +65,8 @@ def outcome(run: Run) -> tuple[str, str]:
     """One line for the end of the run, and its style."""
     if run.result is None:
         return "Cut off before its end", "bad"
-    laps = f"{run.result.laps} training lap{'s' if run.result.laps != 1 else ''}"
-    if run.result.converged:
-        return f"Converged after {laps}: the novice alone passed its proving run", "good"
-    return f"Did not converge within {laps} (censored)", "bad"
+    words = proof_words(run.result)
+    return f"{words[0].upper()}{words[1:]}", "good" if run.result.converged else "bad"
 
 
 def figures(run: Run) -> Iterable[tuple[str, str]]:

@@ -1,18 +1,19 @@
 """Watch a robot learn: the digital twin and the learner in two processes, over the same bus that drives the real robot.
 
-A scripted teacher drives first. Then the experts drive where they agree, the teacher helps where they do not, and a
-network that sees both sensors learns from all of them. It has learned when it drives a lap alone; after that it drives
-layouts it has never seen. It all takes a few minutes and leaves report.html in the run's folder.
+The experts drive where they agree, a scripted teacher helps where they do not, and a novice that sees both sensors
+learns from all of them, each lap on another layout. It is proven when it drives three fresh layouts in a row alone;
+after that it is shown more of them. It all takes a minute or two and leaves report.html in the run's folder.
 
 examples:
   lira demo
   lira demo --seed 3 --unseen 5
   lira demo --world race --laps 20 --run runs/race
   lira demo --world passage
-  lira demo --method plus
+  lira demo --method hold --proof own --layouts own      as in the thesis
   lira demo --wire        the drivers of the real robot in between, byte by byte; in real time
 
-exit status: 0 if the robot learned to drive alone, 1 if it did not within its laps, 2 if something went wrong
+exit status: 0 if the novice was proven within its laps and then passed every unseen layout, without a collision and
+without losing the line; 1 if not; 2 if something went wrong
 """
 
 import argparse
@@ -26,7 +27,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from hal.errors import ConfigError, MissingExtraError
-from tools.arguments import natural
+from tools.arguments import add_protocol, natural
 
 if TYPE_CHECKING:
     from tools.processes import ChildProcess
@@ -43,11 +44,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add = parser.add_argument
     add("--world", help="world by name or .toml file (default: line-obstacles; with --wire lane, which is shorter)")
     add("--profile", help="robot by name or .toml file (default: that of the world's experiment)")
-    add("--method", default="lira", help="way of teaching, as in `lira fusion` (default: %(default)s)")
+    add("--method", default="plus", help="way of teaching, as in `lira fusion` (default: %(default)s)")
     add("--seed", type=natural, default=0, help="seeds teacher, training and noise (default: %(default)s)")
     add("--layout", type=natural, default=0, help="layout to learn on (default: %(default)s)")
     add("--laps", type=natural, default=12, help="give up after so many training laps (default: %(default)s)")
     add("--unseen", type=natural, default=3, help="unseen layouts to drive afterwards (default: %(default)s)")
+    add_protocol(parser, layouts="fresh", proof="fresh:3")
     add(
         "--wire",
         action="store_true",
@@ -59,6 +61,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Run the demo from start to report."""
     from fusion.expert_files import SHIPPED, expert_path
+    from fusion.syllabus import THESIS, with_proof
     from fusion.tasks import TASKS, task_of
     from hal.profile import load_profile
     from sim_backend.catalogue import load_world
@@ -75,6 +78,7 @@ def run(args: argparse.Namespace) -> int:
     for package, extra in {**NEEDED, **(NEEDED_BY_WIRE if args.wire else {})}.items():
         if find_spec(package) is None:
             raise MissingExtraError(package, extra)
+    with_proof(THESIS, args.proof)
     from fusion.presets import method_named  # not sooner: it takes the learner's libraries
 
     method_named(args.method)
@@ -85,6 +89,7 @@ def run(args: argparse.Namespace) -> int:
     twin = ["--world", world, "--profile", robot, *both]
     fusion = [*both, "--name", name, "--connect", endpoint, "--method", args.method, "--teacher", "scripted"]
     fusion += ["--run", str(folder), "--train-laps", str(args.laps), "--unseen", str(args.unseen)]
+    fusion += ["--layouts", args.layouts, "--proof", args.proof]
     fusion += ["--as-command", shlex.join(["lira", *sys.argv[1:]])]
     if args.wire:
         arena = f"127.0.0.1:{free_port()}"
@@ -164,7 +169,8 @@ def raise_dead(parts: Sequence["ChildProcess"]) -> None:
 
 
 def conclude(folder: Path) -> int:
-    """Print the table, write the report, and return 0 if the novice learned to drive alone."""
+    """Print the table, write the report, and return 0 if the novice was proven and passed every unseen layout."""
+    from tools.proven import proof_words, unseen_words
     from tools.report import RECORD, write_report
     from tools.report.digest import load_run
     from tools.report.laps import COLUMNS, lap_cells
@@ -173,10 +179,9 @@ def conclude(folder: Path) -> int:
     run = load_run(folder / RECORD)
     print(f"\n{format_table(COLUMNS, [lap_cells(lap) for lap in run.laps])}\n")
     unseen = [lap.record for lap in run.phase("unseen") if lap.record is not None]
-    if unseen:
-        passed, collisions = sum(lap.passed for lap in unseen), sum(lap.collisions for lap in unseen)
-        print(f"alone on unseen layouts: {passed} of {len(unseen)} passed, {collisions} collisions")
-    converged = run.result is not None and run.result.converged
-    print("the novice drives alone" if converged else "the novice did not pass its proving run")
+    proven = run.result is not None and run.result.converged
+    for words in (unseen_words(unseen), "" if run.result is None else proof_words(run.result)):
+        if words:
+            print(words)
     print(f"report: {write_report(folder)}")
-    return 0 if converged else 1
+    return 0 if proven and all(lap.passed for lap in unseen) else 1

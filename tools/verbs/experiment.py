@@ -20,6 +20,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from hal.errors import ConfigError
+from tools.arguments import natural
 from tools.experiments.registry import REGISTRY, load
 
 if TYPE_CHECKING:
@@ -36,10 +37,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add = parser.add_argument
     add("name", choices=[*REGISTRY, ALL, RESULTS], metavar="NAME", help=f"{names}; {ALL}; {RESULTS}")
     add("--seeds", type=int, default=3, help="repetitions, seeds 0, 1, 2, ... (default: %(default)s)")
+    add("--first-seed", type=natural, default=0, help="begin with this seed instead of 0")
     add(
         "--methods",
         metavar="NAMES",
-        help=f"of table2 and race, play these, separated by commas, or {ALL} (default: four)",
+        help=f"of unseen, table2 and race, play these, separated by commas, or {ALL} (default: four)",
     )
     add(
         "--experts",
@@ -90,6 +92,7 @@ def play(args: argparse.Namespace, name: str) -> "tuple[Summary, Path]":
     methods = ALL if args.name == ALL and experiment.methods else args.methods
     chosen = chosen_methods(methods, experiment, name)
     trials = [trial for trial in experiment.trials(args.seeds) if not chosen or trial.method.name in chosen]
+    trials = [msgspec.structs.replace(each, seed=args.first_seed + each.seed) for each in trials]
     if args.experts is not None:
         if args.name != ALL and all(trial.experts for trial in trials):
             raise ConfigError(f"{name} takes no --experts", "It is played with experts of its own choice.")
@@ -98,6 +101,7 @@ def play(args: argparse.Namespace, name: str) -> "tuple[Summary, Path]":
         provide(pair)
     outcomes = run_trials(trials, args.run, pool)
     command = f"lira experiment {name} --seeds {args.seeds}" + ("" if methods is None else f" --methods {methods}")
+    command += f" --first-seed {args.first_seed}" if args.first_seed else ""
     command += "" if args.experts is None else f" --experts {args.experts}"
     summary = summarise(name, REGISTRY[name].words, command, args.seeds, experiment, outcomes)
     return summary, write_page(args.run, summary, experiment.figures(outcomes))

@@ -2,14 +2,15 @@
 
 It drives whatever robot has that name on the bus: the twin, or the real one. With --policy it only drives; on a twin,
 with --unseen, through so many layouts, and says how each went. With --method it learns: from a person with a gamepad,
-or, on a twin, from a scripted teacher until the novice drives a lap alone. What it learns goes into the --run folder:
+or, on a twin, from a scripted teacher until the novice is proven (--proof). What it learns goes into the --run folder:
 labels.lira (every label), novice.safetensors, run.jsonl.
 
 examples:
   lira fusion --policy camera-expert                   let one expert drive
   lira fusion --policy runs/demo-1/novice.safetensors  let a trained novice drive
   lira fusion --policy runs/demo-1/novice.safetensors --layout 100 --unseen 3   through layouts 101 to 103 of a twin
-  lira fusion --method lira --run runs/mine            learn from a person
+  lira fusion --policy runs/demo-1/novice.safetensors --ask    which stops and calls where it does not know
+  lira fusion --method plus --run runs/mine            learn from a person
   lira fusion --method lira --teacher scripted --run runs/taught
   lira fusion --method lira --experts corridor         in a real corridor
 """
@@ -21,7 +22,7 @@ from typing import TYPE_CHECKING
 
 from fusion.tasks import TASKS, task_of
 from hal.errors import ConfigError
-from tools.arguments import natural
+from tools.arguments import add_protocol, natural
 from tools.lifetime import CLOSE_S
 
 if TYPE_CHECKING:
@@ -45,6 +46,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     what = parser.add_mutually_exclusive_group(required=True)
     what.add_argument("--policy", help="drive only: camera-expert, lidar-expert or a .safetensors file")
     add(
+        "--ask",
+        action="store_true",
+        help="with --policy: a novice of plus stands and calls where it knows less than in the runs that proved it",
+    )
+    add(
         "--experts",
         metavar="PAIR",
         help=f"whose experts: a task ({', '.join(TASKS)}), TASK@SEED, or a folder with camera.safetensors and "
@@ -52,7 +58,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     what.add_argument(
         "--method",
-        help="learn by this method: hold or lira (LIRA-SPF), thesis, hg-dagger, ...; an unknown name lists them all",
+        help="learn by this method: plus, hold (LIRA-SPF), thesis, hg-dagger, ...; an unknown name lists them all",
     )
     add("--start", choices=("human", "experts"), help="LIRA-SPF: who drives before the first training step")
     add(
@@ -73,6 +79,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         default=12,
         help="scripted teacher: give up after so many laps (default: %(default)s)",
     )
+    add_protocol(parser)
     add(
         "--unseen",
         type=natural,
@@ -94,6 +101,8 @@ def run(args: argparse.Namespace) -> int:
 
     if args.method is not None and method_of(args).kind == "switching" and args.teacher == "none":
         raise ConfigError(f"by the method '{args.method}' nobody learns", "Show it on a twin with --teacher perfect.")
+    if args.ask and args.policy is None:
+        raise ConfigError("--ask is for a policy that drives", "Give one with --policy, or leave --ask out.")
     torch.set_num_threads(1)  # the nets are small; and a result should not depend on the number of cores
     bus = Bus(args.name, connect=args.connect)
     robot = RemoteRobot(bus)
@@ -142,14 +151,20 @@ def method_of(args: argparse.Namespace) -> "Method":
 
     from fusion.lira import LiraSettings
     from fusion.presets import method_named
+    from fusion.syllabus import with_proof
 
     method = method_named(args.method)
     if args.start is not None:
         if not isinstance(method.approach, LiraSettings):
             raise ConfigError(f"'{method.name}' takes no --start", "Only LIRA-SPF does.")
         method = msgspec.structs.replace(method, approach=msgspec.structs.replace(method.approach, start=args.start))
+    syllabus = method.syllabus
+    if args.layouts is not None:
+        syllabus = msgspec.structs.replace(syllabus, layouts=args.layouts)
+    if args.proof is not None:
+        syllabus = with_proof(syllabus, args.proof)
     learning = msgspec.structs.replace(method.learning, idle_frames=args.idle_frames)
-    return msgspec.structs.replace(method, learning=learning)
+    return msgspec.structs.replace(method, learning=learning, syllabus=syllabus)
 
 
 def publisher(robot: "RemoteRobot") -> Callable[["Decision"], None]:

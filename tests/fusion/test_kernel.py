@@ -1,0 +1,171 @@
+"""The regression: against the textbook's formulas solved at once, and what leaving out and setting aside mean."""
+
+import math
+
+import numpy as np
+import pytest
+import torch
+
+from fusion.kernel import GAINS, KernelRidge, KernelSettings, kernel, unit
+
+CAMERA, LIDAR = 6, 4
+PLAIN = KernelSettings(contradicts=None)
+
+
+def states(count, seed=0):
+    """States x [count, 10], some of them near each other."""
+    random = torch.Generator().manual_seed(seed)
+    middles = torch.randn(4, CAMERA + LIDAR, generator=random)
+    near = middles[torch.arange(count) % 4] + 0.3 * torch.randn(count, CAMERA + LIDAR, generator=random)
+    return unit(near, CAMERA)
+
+
+def taught(x, actions, settings=PLAIN, *, human=None, groups=None, weights=None):
+    ridge = KernelRidge(CAMERA + LIDAR, CAMERA, settings)
+    for i, action in enumerate(actions):
+        ridge.add(
+            x[i],
+            action,
+            1.0 if weights is None else weights[i],
+            human=True if human is None else human[i],
+            group=i if groups is None else groups[i],
+            label=i,
+        )
+    return ridge
+
+
+def actions(count, seed=0):
+    return [tuple(row) for row in np.random.default_rng(seed).uniform(-1.0, 1.0, (count, 2)).tolist()]
+
+
+def test_each_part_of_a_state_has_length_1_and_a_state_is_like_itself():
+    x = states(5)
+    assert torch.allclose(x[:, :CAMERA].norm(dim=1), torch.ones(5))
+    assert torch.allclose(x[:, CAMERA:].norm(dim=1), torch.ones(5))
+    assert torch.allclose(kernel(x, x, CAMERA, (0.4, 0.4)).diagonal(), torch.ones(5, dtype=torch.float64), atol=1e-5)
+
+
+def test_a_part_that_is_zero_stays_finite():
+    assert torch.isfinite(unit(torch.zeros(1, CAMERA + LIDAR), CAMERA)).all()
+
+
+def test_the_kernel_is_gaussian_in_both_parts():
+    x = states(6)
+    squared = [torch.cdist(part, part).square().double() for part in (x[:, :CAMERA], x[:, CAMERA:])]
+    expected = torch.exp(-squared[0] / (2 * 0.5**2) - squared[1] / (2 * 0.3**2))
+    assert torch.allclose(kernel(x, x, CAMERA, (0.5, 0.3)), expected, atol=1e-4)
+
+
+def test_one_by_one_it_comes_to_what_solving_at_once_does():
+    x, labels, weights = states(30), actions(30), [1.0 + i % 3 for i in range(30)]
+    ridge = taught(x[:29], labels[:29], weights=weights)
+    k, at = kernel(x[:29], x[:29], CAMERA, (0.4, 0.4)), kernel(x[:29], x[29:], CAMERA, (0.4, 0.4))[:, 0]
+    noise = torch.diag(0.1 / torch.tensor(weights[:29], dtype=torch.float64))
+    y = torch.tensor(labels[:29], dtype=torch.float64)
+    mean = at @ torch.linalg.solve(k + noise, y)
+    variance = 1.0 - at @ torch.linalg.solve(k + noise, at)
+    assert ridge.act(x[29]) == pytest.approx(mean.clamp(-1.0, 1.0).tolist(), abs=1e-5)
+    assert ridge.fit.deviation(ridge.k(x[29])).tolist() == pytest.approx(
+        (ridge.fit.scale * variance.sqrt()).tolist(), abs=1e-5
+    )
+
+
+def test_it_knows_what_it_was_shown_and_stands_where_it_was_shown_nothing():
+    x = torch.eye(CAMERA + LIDAR)[:2] + torch.eye(CAMERA + LIDAR)[[CAMERA, CAMERA + 1]]
+    ridge = taught(x[:1], [(0.9, -0.8)], KernelSettings(noise=1e-3))
+    assert ridge.act(x[0]) == pytest.approx((0.9, -0.8), abs=0.01)
+    assert ridge.act(x[1]) == pytest.approx((0.0, 0.0), abs=0.01)
+    known, unknown = (ridge.fit.deviation(ridge.k(each))[1] for each in x)
+    assert known < 0.1 * unknown
+
+
+def test_before_any_label_it_stands():
+    ridge = KernelRidge(CAMERA + LIDAR, CAMERA, KernelSettings())
+    assert ridge.act(states(1)[0], ridge.gain) == (0.0, 0.0)
+    assert ridge.fit.deviation(ridge.k(states(1)[0])).tolist() == [1.0, 1.0]
+
+
+def test_a_group_is_left_out_as_if_it_had_never_been_shown():
+    x, labels, groups = states(24), actions(24), [i // 4 for i in range(24)]
+    residual, variance = taught(x, labels, groups=groups).fit.left_out
+    for group in range(6):
+        inside = [i for i in range(24) if groups[i] == group]
+        others = [i for i in range(24) if groups[i] != group]
+        without = taught(x[others], [labels[i] for i in others])
+        for i in inside:
+            k = without.k(x[i])
+            expected = torch.tensor(labels[i], dtype=torch.float64) - without.fit.mean(k)
+            assert residual[i].tolist() == pytest.approx(expected.tolist(), abs=1e-5)
+            assert float(variance[i]) == pytest.approx(float(1.1 - k @ without.fit.p @ k), abs=1e-5)
+
+
+def test_the_deviation_is_calibrated():
+    """On a function drawn from the prior, 95 % of the errors are below two deviations, more or less."""
+    x = states(400, seed=1)
+    k = kernel(x, x, CAMERA, (0.4, 0.4)) + 1e-4 * torch.eye(400, dtype=torch.float64)
+    draw = (
+        0.3
+        * torch.linalg.cholesky(k)
+        @ torch.randn(400, 2, dtype=torch.float64, generator=torch.Generator().manual_seed(2))
+    )
+    noisy = draw + 0.3 * math.sqrt(0.1) * torch.randn(
+        400, 2, dtype=torch.float64, generator=torch.Generator().manual_seed(3)
+    )
+    ridge = taught(x[:200], [tuple(row) for row in noisy[:200].tolist()])
+    errors = [
+        (abs(float(ridge.fit.mean(ridge.k(x[i]))[1] - draw[i, 1])), float(ridge.fit.deviation(ridge.k(x[i]))[1]))
+        for i in range(200, 400)
+    ]
+    assert 0.9 < np.mean([error < 2.0 * deviation for error, deviation in errors]) <= 1.0
+    assert ridge.fit.scale.tolist() == pytest.approx([0.3, 0.3], rel=0.2)
+
+
+class TestSettingAside:
+    def scene(self, *, human):
+        """Twelve labels of one mind in much the same place, and one that turns the other way."""
+        x = unit(torch.ones(13, CAMERA + LIDAR) + 0.05 * states(13), CAMERA)
+        labels = [(1.0, 0.9)] * 12 + [(1.0, -0.9)]
+        return taught(x, labels, KernelSettings(), human=human), x
+
+    def test_a_label_that_contradicts_all_others_leaves_the_fit_and_is_kept(self):
+        ridge, x = self.scene(human=[True] * 13)
+        assert ridge.fit.used.tolist() == [True] * 12 + [False]
+        assert (len(ridge), ridge.aside) == (13, [12])
+        plain = taught(x[:12], [(1.0, 0.9)] * 12)
+        assert ridge.act(x[12]) == pytest.approx(plain.act(x[12]), abs=1e-6)
+
+    def test_an_expert_goes_before_a_human(self):
+        x = unit(torch.ones(2, CAMERA + LIDAR) + 0.01 * states(2), CAMERA)
+        ridge = taught(x, [(1.0, 1.0), (1.0, -1.0)], KernelSettings(), human=[True, False])
+        assert ridge.fit.used.tolist() == [True, False]
+
+    def test_it_can_be_left_off(self):
+        x = unit(torch.ones(13, CAMERA + LIDAR) + 0.05 * states(13), CAMERA)
+        assert taught(x, [(1.0, 0.9)] * 12 + [(1.0, -0.9)]).fit.used.all()
+
+
+def test_the_gain_makes_up_for_turns_that_are_predicted_too_small():
+    x = states(40)
+    same = taught(x, [(1.0, 0.5)] * 40)
+    assert same.gain == pytest.approx(1.0, abs=0.25)
+    mixed = taught(x, [(1.0, (-1.0, 1.0, 1.0)[i % 3]) for i in range(40)])
+    assert 1.2 < mixed.gain <= GAINS[1]
+    linear, angular = mixed.act(x[0])
+    assert mixed.act(x[0], 1.5) == pytest.approx((linear, max(-1.0, min(1.0, 1.5 * angular))))
+
+
+def test_a_gain_that_is_set_is_used():
+    assert taught(states(4), actions(4), KernelSettings(gain=1.4)).gain == 1.4
+
+
+def test_where_there_are_too_many_the_expert_s_label_goes_that_the_others_say_best():
+    x = states(8)
+    labels = [(1.0, 0.0)] * 4 + [(1.0, 0.9), (0.2, -0.9), (1.0, 0.0), (1.0, 0.0)]
+    human = [False, False, False, False, True, True, False, True]
+    ridge = taught(x, labels, KernelSettings(contradicts=None, most=6), human=human)
+    assert len(ridge) == 6
+    assert [i for i in range(8) if any(torch.equal(x[i], row) for row in ridge.x)] == ridge.labels.tolist()
+    assert ridge.human.tolist().count(True) == 3
+    left = [i for i in range(8) if any(torch.equal(x[i], row) for row in ridge.x)]
+    whole = taught(x[left], [labels[i] for i in left])
+    assert ridge.act(x[0]) == pytest.approx(whole.act(x[0]), abs=1e-6)

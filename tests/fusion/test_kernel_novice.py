@@ -1,0 +1,193 @@
+"""The novice that learns from each label at once, and the file that drives without it."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import torch
+
+from fusion.checkpoint import Checkpoint, build, load_checkpoint, save_checkpoint
+from fusion.kernel import KernelSettings
+from fusion.kernel_net import KernelNet
+from fusion.kernel_novice import KernelNovice
+from fusion.labels import Label, mirror
+from fusion.networks import CameraNet, LidarNet
+from fusion.novice import LearningSettings
+from fusion.preprocess import Features
+from hal.errors import StorageError
+from tools.run_folder import aside_words
+
+BINS, FILTERS = 21, 4
+
+
+def seen(seed):
+    random = np.random.default_rng(seed)
+    return Features(random.random(BINS, dtype=np.float32), random.random((32, 32), dtype=np.float32))
+
+
+def novice(*, mirrored=True, settings=None, **learning):
+    sees = KernelNet.from_experts(CameraNet(FILTERS, seed=1), LidarNet(BINS, seed=2))
+    learning = LearningSettings(**{"human_weight": 3.0} | learning)
+    return KernelNovice(sees, learning, settings or KernelSettings(), mirrored=mirrored)
+
+
+def taught(count=6, **arguments):
+    made = novice(**arguments)
+    for i in range(count):
+        source = "human" if i % 2 else "camera"
+        made.learn(seen(i), (1.0, 1.0 if i % 3 else -1.0), source, made.act(seen(i)))
+    return made
+
+
+def test_it_knows_a_label_at_the_next_step():
+    learner = novice()
+    assert not learner.trained
+    assert learner.act(seen(0)) == (0.0, 0.0)
+    assert learner.learn(seen(0), (0.9, -0.7), "human", (0.0, 0.0))
+    assert learner.trained
+    assert learner.act(seen(0)) == pytest.approx((0.9, -0.7), abs=0.1)
+
+
+def test_what_it_does_already_is_redundant():
+    learner = novice(settings=KernelSettings(noise=0.01))
+    learner.learn(seen(0), (0.9, -0.7), "human", learner.act(seen(0)))
+    assert not learner.learn(seen(0), (0.9, -0.7), "human", learner.act(seen(0)))
+    assert (learner.stored, len(learner.ridge)) == (1, 2)
+
+
+@pytest.mark.parametrize("mirrored", [True, False])
+def test_left_and_right_are_exchanged_where_it_is_asked_to(mirrored):
+    learner = novice(mirrored=mirrored)
+    label = Label(seen(0).scan, seen(0).image, (0.9, -0.7), "human", 3.0)
+    learner.remember(label)
+    other = mirror(label)
+    expected = (0.9, 0.7) if mirrored else (0.0, 0.0)
+    if mirrored:
+        assert learner.act(Features(other.scan, other.image)) == pytest.approx(expected, abs=0.1)
+    assert len(learner.ridge) == 1 + mirrored
+
+
+def test_what_one_source_shows_in_a_row_is_a_group():
+    learner = novice()
+    for i, source in enumerate(["camera", "camera", "human", "human", "camera"]):
+        learner.remember(Label(seen(i).scan, seen(i).image, (1.0, 0.0), source))
+    assert learner.ridge.groups.tolist() == [1, 1, 1, 1, 2, 2, 2, 2, 3, 3]
+
+
+def test_a_label_that_all_others_contradict_is_named_with_who_gave_it():
+    learner = novice(mirrored=False)
+    label = Label(seen(0).scan, seen(0).image, (1.0, 0.9), "human")
+    for _ in range(5):
+        learner.remember(label)
+    learner.remember(replace(label, action=(1.0, -0.9), source="camera"))
+    assert learner.set_aside() == [(5, "camera")]
+    assert aside_words(learner.set_aside()).endswith("labels 5 (camera)")
+    assert aside_words(novice().set_aside()) == ""
+
+
+def test_it_is_less_sure_where_it_has_seen_nothing_like_it():
+    learner = novice()
+    for i in range(6):
+        learner.learn(seen(0), (1.0, 0.3 * (-1) ** i), "human", (0.0, 0.0))
+    far = Features(np.zeros(BINS, np.float32), np.eye(32, dtype=np.float32))
+    assert learner.deviation(seen(0))[1] < learner.deviation(far)[1]
+
+
+def test_two_that_are_taught_the_same_are_the_same_to_the_bit():
+    assert taught().act(seen(9)) == taught().act(seen(9))
+
+
+def test_frozen_it_drives_as_the_novice_alone_and_doubts_as_it_does():
+    learner = taught()
+    network = learner.frozen()
+    for each in map(seen, (0, 1, 77)):
+        assert network.act(each.scan, each.image) == pytest.approx(learner.alone(each), abs=1e-4)
+        deviation = network.deviation(torch.from_numpy(each.scan)[None], torch.from_numpy(each.image)[None])[0]
+        assert deviation.tolist() == pytest.approx(learner.deviation(each), abs=1e-4)
+
+
+def test_alone_it_turns_more_than_while_it_is_taught():
+    learner = taught(settings=KernelSettings(gain=1.4))
+    (linear, angular), alone = learner.act(seen(1)), learner.alone(seen(1))
+    assert alone == pytest.approx((linear, max(-1.0, min(1.0, 1.4 * angular))))
+    assert abs(alone[1]) > abs(angular)
+
+
+def test_it_knows_what_is_unlike_what_the_human_had_to_show_it():
+    learner = novice(mirrored=False)
+    assert not learner.knows(seen(0), 0.25)  # before any human
+    for i, source in enumerate(["camera", "camera", "camera", "human", "camera", "human"]):
+        at = seen(0) if source == "camera" else seen(i)
+        learner.remember(Label(at.scan, at.image, (1.0, 0.1 * i), source))
+    assert learner.knows(seen(0), 0.25)  # three times the same, and no human
+    assert not learner.knows(TestDoubt.FAR, 0.25)
+
+
+class TestDoubt:
+    FAR = Features(np.zeros(BINS, np.float32), np.eye(32, dtype=np.float32))
+
+    def proven(self):
+        learner = taught(12)
+        for i in range(4):
+            learner.proving(seen(i))
+        return learner
+
+    def test_it_doubts_where_it_knows_less_than_anywhere_it_was_proven(self):
+        learner = self.proven()
+        assert not any(learner.doubts(seen(i)) for i in range(4))
+        assert learner.doubts(self.FAR)
+        assert learner.frozen().doubts(self.FAR)
+        assert not learner.frozen().doubts(seen(0))
+
+    def test_before_it_was_proven_and_after_another_label_it_has_no_measure_of_doubt(self):
+        assert not taught().doubts(self.FAR)
+        assert not taught().frozen().doubts(self.FAR)
+        learner = self.proven()
+        learner.remember(Label(seen(50).scan, seen(50).image, (1.0, 0.5), "human"))
+        assert not learner.doubts(self.FAR)
+
+    def test_what_it_does_does_not_depend_on_being_watched(self):
+        learner = taught()
+        assert learner.proving(seen(3)) == learner.alone(seen(3))
+
+
+class TestFile:
+    def saved(self, tmp_path, network):
+        path = tmp_path / "novice.safetensors"
+        about = Checkpoint(network.kind, BINS, FILTERS, "thesis-sim", None, "lira demo", 0, examples=network.examples)
+        save_checkpoint(path, network, about)
+        return path
+
+    def test_it_goes_to_a_file_and_comes_back_with_all_it_was_taught(self, tmp_path):
+        network = taught().frozen()
+        back, about = load_checkpoint(self.saved(tmp_path, network))
+        assert about.kind == "kernel"
+        assert back.act(seen(3).scan, seen(3).image) == network.act(seen(3).scan, seen(3).image)
+
+    @pytest.mark.parametrize("examples", [-1, 10**9])
+    def test_a_number_of_examples_that_nobody_has_taught_is_refused(self, examples):
+        with pytest.raises(ValueError, match=f"a kernel of {examples} examples"):
+            build(Checkpoint("kernel", BINS, FILTERS, "thesis-sim", None, "lira demo", 0, examples=examples))
+
+    def test_one_that_was_taught_nothing_stands(self, tmp_path):
+        back, _ = load_checkpoint(self.saved(tmp_path, novice().frozen()))
+        assert back.act(seen(3).scan, seen(3).image) == (0.0, 0.0)
+
+    @pytest.mark.parametrize(
+        "damage",
+        [
+            lambda weights: weights | {"y": weights["y"][:-1]},
+            lambda weights: weights | {"noise": -weights["noise"]},
+            lambda weights: weights | {"lengths": np.zeros(2, np.float32)},
+            lambda weights: weights | {"x": weights["x"][:, 1:]},
+            lambda weights: weights | {"gain": np.full(1, np.nan, np.float32)},
+            lambda weights: {name: value for name, value in weights.items() if name != "y"},
+            lambda weights: weights | {name: weights[name][:-1] for name in ("x", "y", "noise")},
+        ],
+    )
+    def test_one_that_does_not_fit_is_refused(self, tmp_path, damage):
+        network = taught().frozen()
+        weights = damage(network.weights())
+        network.weights = lambda: weights
+        with pytest.raises(StorageError, match="does not hold what it says"):
+            load_checkpoint(self.saved(tmp_path, network))

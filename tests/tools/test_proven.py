@@ -1,0 +1,64 @@
+"""The words for what was proven, and the interval behind them."""
+
+import pytest
+from made_up_outcomes import lap
+
+from fusion.record import ResultRecord
+from tools.proven import proof_words, share, share_words, unseen_words
+
+
+@pytest.mark.parametrize(
+    ("passed", "laps", "low", "high"),
+    [
+        (12, 12, 0.7354, 1.0),
+        (0, 12, 0.0, 0.2646),
+        (3, 3, 0.2924, 1.0),
+        (8, 10, 0.4439, 0.9748),
+        (257, 300, 0.8118, 0.8943),
+    ],
+)
+def test_the_interval_is_the_one_in_the_tables(passed, laps, low, high):
+    assert share(passed, laps) == pytest.approx((low, high), abs=1e-3)
+
+
+def test_thousands_of_laps_are_no_trouble():
+    low, high = share(2970, 3000)
+    assert 0.985 < low < 0.99 < high < 0.995
+
+
+def test_it_covers_the_true_rate_as_often_as_it_says():
+    from math import comb
+
+    rate, laps = 0.9, 12
+    covered = sum(
+        comb(laps, k) * rate**k * (1 - rate) ** (laps - k)
+        for k in range(laps + 1)
+        if share(k, laps)[0] <= rate <= share(k, laps)[1]
+    )
+    assert covered >= 0.95
+
+
+def test_a_share_says_how_sure_it_is():
+    assert share_words(12, 12) == "12 of 12 unseen layouts; 95 %: 74 to 100 %"
+
+
+def result(converged, laps, proof):
+    return ResultRecord(converged, laps, 20, 0, 5, 9, 90, 90, 120.0, 6.0, proof=proof)
+
+
+def test_the_proof_is_named_for_what_it_was():
+    assert proof_words(result(True, 1, "fresh:3")) == (
+        "proven after 1 training lap: the novice alone passed 3 fresh layouts in a row"
+    )
+    assert proof_words(result(True, 2, "fresh:11/12")).endswith("passed 11 of 12 fresh layouts")
+    assert proof_words(result(False, 12, "own")) == (
+        "not proven within 12 training laps: the novice alone did not pass the layout it was taught on"
+    )
+
+
+def test_what_went_wrong_on_unseen_layouts_is_said():
+    laps = [lap("unseen"), lap("unseen", passed=False, collisions=2), lap("unseen", passed=False, lost=1)]
+    assert unseen_words(laps) == (
+        "alone it passed 1 of 3 unseen layouts; 95 %: 1 to 91 %; collisions: 2, lost lines: 1"
+    )
+    assert unseen_words([]) == ""
