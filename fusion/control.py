@@ -4,13 +4,13 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Protocol
 
-from fusion.method import STAND, Choice, Chooser, Lesson, Method, Policy, Proposal
-from fusion.preprocess import Features, Preprocessor
-from hal.errors import SensorError
-from hal.messages import HELD as HELD
-from hal.messages import STOP, Action, Applied, Command, CourseState, Observation, Reason, Source, Twist
-from hal.port import Restartable, Robot
-from hal.profile import Base
+from lira.fusion.methods.base import STAND, Choice, Chooser, Lesson, Method, Policy, Proposal
+from lira.fusion.preprocess import Features, Preprocessor
+from lira.hal.errors import SensorError
+from lira.hal.messages import HELD as HELD
+from lira.hal.messages import STOP, Action, Applied, Command, CourseState, Observation, Reason, Source, Twist
+from lira.hal.port import Restartable, Robot
+from lira.hal.profile import Base
 
 
 class Teacher(Protocol):

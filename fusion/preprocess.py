@@ -9,11 +9,11 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from hal.errors import SensorError
-from hal.messages import ByteArray, CompressedImage, FloatArray, Image, LaserScan, Observation
-from hal.profile import Features as FeatureShape
-from hal.profile import RobotProfile
-from hal.ranges import read_ranges
+from lira.hal.errors import SensorError
+from lira.hal.messages import ByteArray, CompressedImage, FloatArray, Image, LaserScan, Observation
+from lira.hal.messages.ranges import read_ranges
+from lira.hal.profile import Features as FeatureShape
+from lira.hal.profile import RobotProfile
 
 # Beam angles arrive as float32, so a beam that lies on the edge between two bins is off by less than this.
 EDGE_BINS = 1e-3

@@ -7,11 +7,11 @@ anew.
 from collections.abc import Callable
 from threading import Event
 
-from fusion.control import ControlLoop
-from fusion.journal import Journal
-from fusion.method import Method
-from fusion.requests import RequestDesk
-from hal.messages import Reason
+from lira.fusion.control import ControlLoop
+from lira.fusion.log.recorder import Journal
+from lira.fusion.methods.base import Method
+from lira.fusion.operator_service import RequestDesk
+from lira.hal.messages import Reason
 
 REARM = "press and release the dead-man (the console's space bar is one), or start lira fusion again"
 STOPPED = {

@@ -13,7 +13,7 @@ from typing import BinaryIO, TypeVar
 
 import msgspec
 
-from hal.errors import ConfigError, StorageError
+from lira.hal.errors import ConfigError, StorageError
 
 T = TypeVar("T")
 MOST_BYTES = 2**20  # a hundred times the longest that comes with the project

@@ -3,8 +3,8 @@
 from dataclasses import dataclass
 from typing import Protocol, runtime_checkable
 
-from hal.messages import Applied, Command, CourseState, Episode, Observation
-from hal.profile import RobotProfile
+from lira.hal.messages import Applied, Command, CourseState, Episode, Observation
+from lira.hal.profile import RobotProfile
 
 
 class Robot(Protocol):

@@ -11,8 +11,8 @@ from typing import Annotated, Literal
 import msgspec
 from msgspec import Meta
 
-from hal.config import Table, load_toml
-from hal.errors import ConfigError
+from lira.hal.config import Table, load_toml
+from lira.hal.errors import ConfigError
 
 Positive = Annotated[float, Meta(gt=0.0)]
 NotNegative = Annotated[float, Meta(ge=0.0)]
@@ -187,7 +187,7 @@ def profile_from_json(data: bytes) -> RobotProfile:
 
 def known_profiles() -> list[str]:
     """Names of the profiles that come with the project."""
-    folder = resources.files("hal") / "profiles"
+    folder = resources.files("lira.hal") / "profiles"
     return sorted(entry.name.removesuffix(".toml") for entry in folder.iterdir() if entry.name.endswith(".toml"))
 
 
@@ -200,4 +200,4 @@ def load_profile(name_or_path: str) -> RobotProfile:
             f"unknown profile '{name_or_path}'",
             f"Known profiles: {', '.join(known_profiles())}; or give the path of a .toml file.",
         )
-    return load_toml(Path(str(resources.files("hal") / "profiles" / f"{name_or_path}.toml")), RobotProfile)
+    return load_toml(Path(str(resources.files("lira.hal") / "profiles" / f"{name_or_path}.toml")), RobotProfile)

@@ -5,9 +5,9 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from hal.messages import LaserScan
-from hal.profile import Base
-from hal.ranges import read_ranges
+from lira.hal.messages import LaserScan
+from lira.hal.messages.ranges import read_ranges
+from lira.hal.profile import Base
 
 CONE_RAD = math.radians(10.0)  # to each side of straight ahead: what fills it has to be one wall
 SEEN = 0.8  # share of the beams in the cone that must say something

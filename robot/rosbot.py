@@ -6,19 +6,19 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, TypeVar
 
-from hal.clock import is_fresh
-from hal.errors import ConfigError, DeviceError
-from hal.messages import STOP, Applied, Command, DepthImage, LaserScan, Observation, Reason, Source
-from hal.port import DeviceHealth
-from hal.profile import RobotProfile
-from hal.senses import Stamped
-from hal.topics import BATTERY, CAMERA, DEPTH, IMU, ODOM, RANGES, SCAN, Topic
-from robot.camera.device import CameraDevice
-from robot.camera.source import Picture
-from robot.core2.device import Core2
-from robot.keeper import Keeper
-from robot.rplidar.device import RPLidar
-from robot.settings import Settings
+from lira.hal.bus.clock import is_fresh
+from lira.hal.bus.topics import BATTERY, CAMERA, DEPTH, IMU, ODOM, RANGES, SCAN, Topic
+from lira.hal.client.sensor_reader import Stamped
+from lira.hal.errors import ConfigError, DeviceError
+from lira.hal.messages import STOP, Applied, Command, DepthImage, LaserScan, Observation, Reason, Source
+from lira.hal.port import DeviceHealth
+from lira.hal.profile import RobotProfile
+from lira.robot.camera.device import CameraDevice
+from lira.robot.camera.source import Picture
+from lira.robot.core2.device import Core2
+from lira.robot.rplidar.device import RPLidar
+from lira.robot.settings import Settings
+from lira.robot.supervisor import Keeper
 
 S = TypeVar("S", bound=Stamped)
 

@@ -7,7 +7,7 @@ from typing import Annotated
 
 from msgspec import Meta
 
-from hal.config import Table, load_toml, parse_toml, read_bounded, write_whole
+from lira.hal.config import Table, load_toml, parse_toml, read_bounded, write_whole
 
 Scale = Annotated[float, Meta(gt=0.5, lt=2.0)]
 Seconds = Annotated[float, Meta(ge=0.0, le=10.0)]

@@ -5,10 +5,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from hal.messages import STOP, CourseState, Odometry, Twist
-from hal.profile import Base
-from sim_backend import drive
-from sim_backend.course import Course
+from lira.hal.messages import STOP, CourseState, Odometry, Twist
+from lira.hal.profile import Base
+from lira.sim_backend import drive
+from lira.sim_backend.course import Course
 
 # The referee looks at least this often, and every centimetre or so where a box may be touched.
 REFEREE_PERIOD_S = 0.2

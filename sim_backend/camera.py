@@ -9,9 +9,9 @@ import math
 import cv2
 import numpy as np
 
-from hal.messages import ByteArray
-from hal.profile import Camera
-from sim_backend.scene import Scene
+from lira.hal.messages import ByteArray
+from lira.hal.profile import Camera
+from lira.sim_backend.scene import Scene
 
 NEAR_M = 0.02
 FAR_M = 60.0

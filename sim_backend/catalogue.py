@@ -5,15 +5,15 @@ from pathlib import Path
 
 import msgspec
 
-from hal.config import load_toml
-from hal.errors import ConfigError
-from sim_backend.layout import check
-from sim_backend.world import World
+from lira.hal.config import load_toml
+from lira.hal.errors import ConfigError
+from lira.sim_backend.layout import check
+from lira.sim_backend.world import World
 
 
 def known_worlds() -> list[str]:
     """Names of the worlds that come with the project."""
-    folder = resources.files("sim_backend") / "worlds"
+    folder = resources.files("lira.sim_backend") / "worlds"
     return sorted(entry.name.removesuffix(".toml") for entry in folder.iterdir() if entry.name.endswith(".toml"))
 
 
@@ -26,7 +26,7 @@ def load_world(name_or_path: str) -> World:
     if name_or_path.endswith(".toml"):
         path = Path(name_or_path)
     elif name_or_path in known_worlds():
-        path = Path(str(resources.files("sim_backend") / "worlds" / f"{name_or_path}.toml"))
+        path = Path(str(resources.files("lira.sim_backend") / "worlds" / f"{name_or_path}.toml"))
     else:
         raise ConfigError(
             f"unknown world '{name_or_path}'",

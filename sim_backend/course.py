@@ -5,9 +5,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from hal.profile import Base
-from sim_backend.layout import Block, Layout
-from sim_backend.polyline import Floats
+from lira.hal.profile import Base
+from lira.sim_backend.layout import Block, Layout
+from lira.sim_backend.polyline import Floats
 
 
 @dataclass(frozen=True, slots=True)

@@ -10,8 +10,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from hal.profile import Base
-from sim_backend.polyline import Floats
+from lira.hal.profile import Base
+from lira.sim_backend.polyline import Floats
 
 FIRMWARE_PERIOD_S = 0.01
 FIRMWARE_WATCHDOG_S = 1.0

@@ -6,17 +6,17 @@ from dataclasses import dataclass
 import msgspec
 import numpy as np
 
-from hal.messages import Action, Command, CourseState, Observation, Twist
-from hal.profile import RobotProfile
-from sim_backend import drive
-from sim_backend.catalogue import load_world
-from sim_backend.course import Course, Place, footprint_radius_m
-from sim_backend.drive import Motion
-from sim_backend.layout import build
-from sim_backend.polyline import Floats
-from sim_backend.sensors import Renderer
-from sim_backend.twin import Twin
-from sim_backend.world import World
+from lira.hal.messages import Action, Command, CourseState, Observation, Twist
+from lira.hal.profile import RobotProfile
+from lira.sim_backend import drive
+from lira.sim_backend.catalogue import load_world
+from lira.sim_backend.course import Course, Place, footprint_radius_m
+from lira.sim_backend.drive import Motion
+from lira.sim_backend.layout import build
+from lira.sim_backend.polyline import Floats
+from lira.sim_backend.sensors import Renderer
+from lira.sim_backend.twin import Twin
+from lira.sim_backend.world import World
 
 # A box's corner can hide between two looks at the clearance that are farther apart than this.
 LOOK_PERIOD_S = 0.1

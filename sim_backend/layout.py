@@ -5,9 +5,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from hal.errors import ConfigError
-from sim_backend.polyline import Floats, Polyline, resample
-from sim_backend.world import CLOSING_DEG, CLOSING_M, Along, Area, Box, Line, Patch, Start, Tiles, World
+from lira.hal.errors import ConfigError
+from lira.sim_backend.polyline import Floats, Polyline, resample
+from lira.sim_backend.world import CLOSING_DEG, CLOSING_M, Along, Area, Box, Line, Patch, Start, Tiles, World
 
 DRAWN_STEP_M = 0.02
 # Nothing random stands nearer than this to the start, nothing at all nearer than a robot's size.

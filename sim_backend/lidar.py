@@ -4,10 +4,10 @@ import math
 
 import numpy as np
 
-from hal.messages import FloatArray, LaserScan
-from hal.profile import Lidar
-from sim_backend.polyline import Floats
-from sim_backend.scene import Scene
+from lira.hal.messages import FloatArray, LaserScan
+from lira.hal.profile import Lidar
+from lira.sim_backend.polyline import Floats
+from lira.sim_backend.scene import Scene
 
 
 def beam_angles(lidar: Lidar) -> tuple[Floats, float]:

@@ -22,11 +22,11 @@ from typing import TypeVar
 
 import numpy as np
 
-from hal.errors import MissingExtraError
-from hal.messages import ByteArray, FloatArray
-from sim_backend.layout import Block, Layout, Mark
-from sim_backend.polyline import Floats, Polyline
-from sim_backend.world import Line
+from lira.hal.errors import MissingExtraError
+from lira.hal.messages import ByteArray, FloatArray
+from lira.sim_backend.layout import Block, Layout, Mark
+from lira.sim_backend.polyline import Floats, Polyline
+from lira.sim_backend.world import Line
 
 T = TypeVar("T")
 

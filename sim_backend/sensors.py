@@ -5,14 +5,14 @@ from typing import Literal
 
 import numpy as np
 
-from hal.errors import ConfigError
-from hal.messages import CompressedImage, Image, LaserScan
-from hal.profile import Camera, RobotProfile
-from sim_backend.camera import SMALL_PX, PinholeCamera, add_noise, encode_jpeg
-from sim_backend.drive import Motion
-from sim_backend.layout import Layout
-from sim_backend.lidar import RayLidar
-from sim_backend.scene import Scene, quiet
+from lira.hal.errors import ConfigError
+from lira.hal.messages import CompressedImage, Image, LaserScan
+from lira.hal.profile import Camera, RobotProfile
+from lira.sim_backend.camera import SMALL_PX, PinholeCamera, add_noise, encode_jpeg
+from lira.sim_backend.drive import Motion
+from lira.sim_backend.layout import Layout
+from lira.sim_backend.lidar import RayLidar
+from lira.sim_backend.scene import Scene, quiet
 
 ROUNDING_S = 1e-9
 TRIAL_FRAMES = 3

@@ -4,16 +4,16 @@ import math
 import threading
 import time
 
-from hal.errors import ConfigError, DeviceError
-from hal.messages import STOP, Applied, Command, CourseState, Episode, Observation, Reason, Source, Twist
-from hal.profile import Base, RobotProfile
-from sim_backend.body import Body
-from sim_backend.catalogue import load_world
-from sim_backend.course import Course, footprint_radius_m
-from sim_backend.layout import Layout, build
-from sim_backend.scene import import_pybullet
-from sim_backend.sensors import ROUNDING_S, Renderer, Sensors
-from sim_backend.world import World
+from lira.hal.errors import ConfigError, DeviceError
+from lira.hal.messages import STOP, Applied, Command, CourseState, Episode, Observation, Reason, Source, Twist
+from lira.hal.profile import Base, RobotProfile
+from lira.sim_backend.body import Body
+from lira.sim_backend.catalogue import load_world
+from lira.sim_backend.course import Course, footprint_radius_m
+from lira.sim_backend.layout import Layout, build
+from lira.sim_backend.scene import import_pybullet
+from lira.sim_backend.sensors import ROUNDING_S, Renderer, Sensors
+from lira.sim_backend.world import World
 
 ODOMETRY_PERIOD_S = 0.05
 

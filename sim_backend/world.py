@@ -8,7 +8,7 @@ from typing import Annotated
 
 from msgspec import Meta
 
-from hal.config import Table
+from lira.hal.config import Table
 
 # Whatever is beyond a kilometre is a slip of the unit, or not a number.
 Metres = Annotated[float, Meta(ge=-1000.0, le=1000.0)]

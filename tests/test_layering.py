@@ -1,6 +1,7 @@
-"""Who may import whom. The table is the architecture; this test keeps it true."""
+"""Who may import whom. The tables are the architecture; these tests keep them true."""
 
 import ast
+from functools import cache
 from pathlib import Path
 
 import pytest
@@ -13,38 +14,112 @@ MAY_IMPORT = {
     "fusion": {"fusion", "hal"},
     "tools": {"tools", "hal", "robot", "sim_backend", "fusion"},
 }
+# Inside a package: each folder, and each module beside the folders, may import those before it that its row names.
+ROOMS = {
+    "hal": {
+        "errors": set(),
+        "config": {"errors"},
+        "messages": {"errors"},
+        "profile": {"errors", "config", "messages"},
+        "port": {"messages", "profile"},
+        "bus": {"errors", "messages"},
+        "safety": {"messages", "profile", "port"},
+        "server": {"errors", "messages", "profile", "port", "bus", "safety"},
+        "client": {"errors", "messages", "profile", "port", "bus", "safety", "server"},
+        "testing": {"messages", "profile"},
+    },
+    "fusion": {
+        "preprocess": set(),
+        "policies": {"preprocess"},
+        "learning": {"preprocess", "policies"},
+        "methods": {"preprocess", "policies", "learning"},
+        "experts": {"preprocess", "policies", "methods"},
+        "control": {"preprocess", "methods"},
+        "log": {"preprocess", "learning", "methods", "control"},
+        "teaching": {"preprocess", "learning", "methods", "experts", "control", "log"},
+        "operator_service": {"methods", "control", "log"},
+        "service": {"methods", "control", "log", "operator_service"},
+    },
+}
+MOST_MODULES = 17  # in one folder
 NOT_ON_THE_ROBOT = {"torch", "pybullet", "pygame", "safetensors", "matplotlib"}
 
 
-def imports(path: Path, *, top_level_only: bool = False) -> set[str]:
+@cache
+def imports(path: Path, *, top_level_only: bool = False) -> frozenset[str]:
+    """Full names of what a file imports; of `from a import b` both `a` and `a.b`."""
     tree = ast.parse(path.read_text(encoding="utf-8"))
-    nodes = tree.body if top_level_only else list(ast.walk(tree))
     found = set()
-    for node in nodes:
+    for node in tree.body if top_level_only else ast.walk(tree):
         if isinstance(node, ast.Import):
-            found |= {alias.name.split(".")[0] for alias in node.names}
+            found |= {alias.name for alias in node.names}
         elif isinstance(node, ast.ImportFrom) and node.level == 0 and node.module:
-            found.add(node.module.split(".")[0])
-    return found
+            found |= {node.module, *(f"{node.module}.{alias.name}" for alias in node.names)}
+    return frozenset(found)
+
+
+def foreign(path: Path, *, top_level_only: bool = False) -> set[str]:
+    """Top-level names that a file imports."""
+    return {name.split(".")[0] for name in imports(path, top_level_only=top_level_only)}
+
+
+def rooms(path: Path, package: str) -> set[str]:
+    """Which rooms of a package a file imports from."""
+    inside = [name.split(".")[2:] for name in imports(path) if name.startswith(f"lira.{package}.")]
+    return {name[0] for name in inside} & set(ROOMS[package])
 
 
 def modules(package: str) -> list[Path]:
     return sorted((ROOT / package).rglob("*.py"))
 
 
+def shown(path: Path) -> str:
+    return str(path.relative_to(ROOT))
+
+
 @pytest.mark.parametrize("package", MAY_IMPORT)
 def test_packages_import_only_what_the_table_allows(package):
     for path in modules(package):
-        ours = imports(path) & set(MAY_IMPORT)
-        assert ours <= MAY_IMPORT[package], f"{path.relative_to(ROOT)} imports {ours - MAY_IMPORT[package]}"
+        ours = {name.split(".")[1] for name in imports(path) if name.startswith("lira.")}
+        assert ours <= MAY_IMPORT[package], f"{shown(path)} imports {ours - MAY_IMPORT[package]}"
+
+
+@pytest.mark.parametrize("package", MAY_IMPORT)
+def test_nothing_imports_a_package_by_the_name_of_its_folder(package):
+    for path in [*modules(package), *modules("tests")]:
+        assert not foreign(path) & set(MAY_IMPORT), shown(path)
+
+
+@pytest.mark.parametrize(("package", "room"), [(package, room) for package in ROOMS for room in ROOMS[package]])
+def test_rooms_import_only_those_below_them(package, room):
+    folder, single = ROOT / package / room, ROOT / package / f"{room}.py"
+    for path in sorted(folder.rglob("*.py")) if folder.is_dir() else [single]:
+        above = rooms(path, package) - ROOMS[package][room] - {room}
+        assert not above, f"{shown(path)} imports {above}"
+
+
+@pytest.mark.parametrize("package", ROOMS)
+def test_every_room_stands_in_the_table_behind_those_that_it_may_import(package):
+    found = {path.stem for path in (ROOT / package).glob("*.py")} - {"__init__"}
+    found |= {path.parent.name for path in (ROOT / package).glob("*/__init__.py")}
+    assert found == set(ROOMS[package])
+    order = list(ROOMS[package])
+    for room, below in ROOMS[package].items():
+        assert below <= set(order[: order.index(room)]), room
+
+
+def test_no_folder_is_a_warehouse():
+    for folder in {path.parent for package in MAY_IMPORT for path in modules(package)}:
+        count = len([path for path in folder.glob("*.py") if path.name != "__init__.py"])
+        assert count <= MOST_MODULES, f"{shown(folder)} has {count} modules"
 
 
 @pytest.mark.parametrize("package", ["hal", "robot"])
 def test_the_robots_side_needs_no_learning_or_simulation_packages(package):
     for path in modules(package):
-        assert not imports(path) & NOT_ON_THE_ROBOT, path
+        assert not foreign(path) & NOT_ON_THE_ROBOT, shown(path)
 
 
 def test_the_command_line_starts_without_heavy_imports():
-    for path in [ROOT / "tools" / "__init__.py", ROOT / "tools" / "cli.py"]:
-        assert not imports(path, top_level_only=True) & (NOT_ON_THE_ROBOT | {"numpy", "cv2", "zenoh"}), path
+    for path in [ROOT / "lira" / "__init__.py", ROOT / "tools" / "__init__.py", ROOT / "tools" / "cli.py"]:
+        assert not foreign(path, top_level_only=True) & (NOT_ON_THE_ROBOT | {"numpy", "cv2", "zenoh"}), shown(path)

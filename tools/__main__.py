@@ -1,6 +1,6 @@
-"""`python -m tools` is the `lira` command."""
+"""`python -m lira.tools` is the `lira` command."""
 
-from tools.cli import entry
+from lira.tools.cli import entry
 
 if __name__ == "__main__":
     entry()

@@ -8,10 +8,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from hal.errors import LiraError
-from hal.messages import STOP, Applied, Command, LaserScan, Observation, Odometry, Reason, Twist
-from hal.port import Robot
-from robot.calibration import free_ahead_m, free_around_m
+from lira.hal.errors import LiraError
+from lira.hal.messages import STOP, Applied, Command, LaserScan, Observation, Odometry, Reason, Twist
+from lira.hal.port import Robot
+from lira.robot.calibration import free_ahead_m, free_around_m
 
 PERIOD_S = 0.05
 ARM_S = 5.0

@@ -7,8 +7,8 @@ import signal
 import sys
 from typing import TYPE_CHECKING, NamedTuple, NoReturn, Protocol, cast
 
-from hal.errors import ConfigError, LiraError, MissingExtraError
-from tools import lifetime
+from lira.hal.errors import ConfigError, LiraError, MissingExtraError
+from lira.tools.launch import lifetime
 
 if TYPE_CHECKING:
     from _typeshed import SupportsWrite
@@ -22,23 +22,31 @@ class Verb(NamedTuple):
 
 
 VERBS = {
-    "demo": Verb("tools.verbs.demo", "teach a robot in the digital twin, from start to report, in minutes"),
-    "twin": Verb("tools.verbs.twin", "the digital twin: a simulated ROSbot on the bus"),
-    "robot": Verb("tools.verbs.robot", "the physical ROSbot: opens its lidar, camera and base, and puts it on the bus"),
-    "ros2": Verb("tools.verbs.ros2", "a robot that runs ROS 2: puts it on the bus through zenoh-bridge-ros2dds"),
-    "calibrate": Verb("tools.verbs.calibrate", "measure how far the base really goes, and write it into its settings"),
-    "fusion": Verb("tools.verbs.fusion", "the learner: reads sensors, decides, drives, trains (LIRA-SPF, HG-DAgger)"),
-    "train-expert": Verb("tools.verbs.train_expert", "train the camera or the lidar expert"),
-    "experiment": Verb("tools.verbs.experiment", "repeat an experiment of the thesis, with statistics"),
-    "joystick": Verb("tools.verbs.joystick", "drive by hand: a gamepad on this machine, straight to the robot"),
-    "console": Verb("tools.verbs.console", "watch the robot learn on a screen"),
-    "report": Verb("tools.verbs.report", "make the HTML page of a recorded run"),
-    "labels": Verb("tools.verbs.labels", "look through a log of labels for damage, and repair it"),
-    "keys": Verb("tools.verbs.keys", "make the keys that say who may drive a robot, and encrypt the bus"),
-    "stop-test": Verb("tools.verbs.stop_test", "break things while a robot drives, and measure how soon it stands"),
-    "parity": Verb("tools.verbs.parity", "the same motions on two robots, and where they differ"),
-    "world": Verb("tools.verbs.world", "draw a world from above and as the camera sees it"),
-    "bench": Verb("tools.verbs.bench", "measure speed on this machine"),
+    "demo": Verb("lira.tools.verbs.demo", "teach a robot in the digital twin, from start to report, in minutes"),
+    "twin": Verb("lira.tools.verbs.twin", "the digital twin: a simulated ROSbot on the bus"),
+    "robot": Verb(
+        "lira.tools.verbs.robot", "the physical ROSbot: opens its lidar, camera and base, and puts it on the bus"
+    ),
+    "ros2": Verb("lira.tools.verbs.ros2", "a robot that runs ROS 2: puts it on the bus through zenoh-bridge-ros2dds"),
+    "calibrate": Verb(
+        "lira.tools.verbs.calibrate", "measure how far the base really goes, and write it into its settings"
+    ),
+    "fusion": Verb(
+        "lira.tools.verbs.fusion", "the learner: reads sensors, decides, drives, trains (LIRA-SPF, HG-DAgger)"
+    ),
+    "train-expert": Verb("lira.tools.verbs.train_expert", "train the camera or the lidar expert"),
+    "experiment": Verb("lira.tools.verbs.experiment", "repeat an experiment of the thesis, with statistics"),
+    "joystick": Verb("lira.tools.verbs.joystick", "drive by hand: a gamepad on this machine, straight to the robot"),
+    "console": Verb("lira.tools.verbs.console", "watch the robot learn on a screen"),
+    "report": Verb("lira.tools.verbs.report", "make the HTML page of a recorded run"),
+    "labels": Verb("lira.tools.verbs.labels", "look through a log of labels for damage, and repair it"),
+    "keys": Verb("lira.tools.verbs.keys", "make the keys that say who may drive a robot, and encrypt the bus"),
+    "stop-test": Verb(
+        "lira.tools.verbs.stop_test", "break things while a robot drives, and measure how soon it stands"
+    ),
+    "parity": Verb("lira.tools.verbs.parity", "the same motions on two robots, and where they differ"),
+    "world": Verb("lira.tools.verbs.world", "draw a world from above and as the camera sees it"),
+    "bench": Verb("lira.tools.verbs.bench", "measure speed on this machine"),
 }
 
 # Packages that only a part of the installation has, and the extra that brings them.

@@ -11,9 +11,9 @@ import numpy as np
 from openni import openni2
 from openni.utils import ClosedHandle, InitializationError, OpenNIError
 
-from hal.errors import DeviceError, SensorError
-from hal.messages import DepthImage, Image
-from hal.topics import DEPTH
+from lira.hal.bus.topics import DEPTH
+from lira.hal.errors import DeviceError, SensorError
+from lira.hal.messages import DepthImage, Image
 
 # A driver's own thread may still be at its last picture when the stream has stopped; to close it then crashes.
 SETTLE_S = 0.15

@@ -6,8 +6,8 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from hal.errors import SensorError
-from hal.pictures import objection
+from lira.hal.errors import SensorError
+from lira.hal.messages.images import objection
 
 CHANNELS = 3
 

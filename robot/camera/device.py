@@ -7,12 +7,12 @@ from pathlib import Path
 
 import cv2
 
-from hal.errors import DeviceError, SensorError
-from hal.messages import CompressedImage, DepthImage
-from hal.pictures import JPEG_START
-from hal.profile import Camera
-from robot.camera.decode import check, decode
-from robot.camera.source import Picture, Source, open_source
+from lira.hal.errors import DeviceError, SensorError
+from lira.hal.messages import CompressedImage, DepthImage
+from lira.hal.messages.images import JPEG_START
+from lira.hal.profile import Camera
+from lira.robot.camera.decode import check, decode
+from lira.robot.camera.source import Picture, Source, open_source
 
 GRAB_S = 0.2
 FIRST_S = 5.0  # some cameras take their time to begin

@@ -7,11 +7,11 @@ from pathlib import Path
 
 import numpy as np
 
-from hal.errors import DeviceError, SensorError
-from hal.messages import CompressedImage, Image
-from hal.pictures import JPEG_START
-from robot.camera.decode import check, decode
-from robot.camera.source import LARGEST_BYTES, Picture
+from lira.hal.errors import DeviceError, SensorError
+from lira.hal.messages import CompressedImage, Image
+from lira.hal.messages.images import JPEG_START
+from lira.robot.camera.decode import check, decode
+from lira.robot.camera.source import LARGEST_BYTES, Picture
 
 PERIOD_S = 1 / 15
 KINDS = {".jpg", ".jpeg", ".png"}

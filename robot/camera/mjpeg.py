@@ -6,9 +6,9 @@ import re
 import time
 from urllib.parse import urlsplit
 
-from hal.errors import DeviceError
-from hal.messages import CompressedImage
-from robot.camera.source import LARGEST_BYTES
+from lira.hal.errors import DeviceError
+from lira.hal.messages import CompressedImage
+from lira.robot.camera.source import LARGEST_BYTES
 
 SILENCE_S = 1.0
 READ_SIZE = 65536

@@ -4,8 +4,8 @@ from pathlib import Path
 from typing import Protocol
 from urllib.parse import urlsplit
 
-from hal.errors import ConfigError
-from hal.messages import CompressedImage, DepthImage, Image
+from lira.hal.errors import ConfigError
+from lira.hal.messages import CompressedImage, DepthImage, Image
 
 LARGEST_BYTES = 8_000_000  # a picture that is larger, or does not end, is none
 
@@ -38,19 +38,19 @@ def open_source(url: str, size: tuple[int, int], openni_folder: Path | None, *, 
     if depth and scheme != "openni":
         raise ConfigError(f"'{url}' has no depth", "Take depth = true out of the settings, or use openni:.")
     if scheme == "openni":
-        from robot.camera.astra import OpenniSource
+        from lira.robot.camera.astra import OpenniSource
 
         return OpenniSource(url.removeprefix("openni:"), size, openni_folder, depth=depth)
     if scheme in ("http", "https"):
-        from robot.camera.mjpeg import MjpegSource
+        from lira.robot.camera.mjpeg import MjpegSource
 
         return MjpegSource(url)
     if scheme in ("rtsp", "rtsps") or url.startswith("/dev/"):
-        from robot.camera.video import VideoSource
+        from lira.robot.camera.video import VideoSource
 
         return VideoSource(url, size)
     if Path(url).is_dir():
-        from robot.camera.folder import FolderSource
+        from lira.robot.camera.folder import FolderSource
 
         return FolderSource(Path(url))
     raise ConfigError(

@@ -5,9 +5,9 @@ import time
 import cv2
 import numpy as np
 
-from hal.errors import DeviceError
-from hal.messages import Image
-from robot.camera.decode import colours
+from lira.hal.errors import DeviceError
+from lira.hal.messages import Image
+from lira.robot.camera.decode import colours
 
 OPEN_MS, READ_MS = 5000, 1000
 

@@ -4,13 +4,13 @@ import math
 from dataclasses import dataclass, field
 from typing import Any
 
-from hal.errors import DeviceError, SensorError
-from hal.messages import BatteryState, Imu, Odometry, Range
-from robot.core2 import messages
-from robot.core2.errands import Errands
-from robot.core2.rosserial import Frame, Id, TopicInfo, encode_frame, encode_strings, encode_time, parse_topic_info
-from robot.core2.wheels import Reckoner
-from robot.settings import BaseSettings
+from lira.hal.errors import DeviceError, SensorError
+from lira.hal.messages import BatteryState, Imu, Odometry, Range
+from lira.robot.core2 import messages
+from lira.robot.core2.config_calls import Errands
+from lira.robot.core2.rosserial import Frame, Id, TopicInfo, encode_frame, encode_strings, encode_time, parse_topic_info
+from lira.robot.core2.wheels import Reckoner
+from lira.robot.settings import BaseSettings
 
 # The board stamps with the time we gave it; what it says is believed if it is a plausible time before now.
 OLDEST_STAMP_S = 0.25

@@ -7,15 +7,15 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from hal.errors import DeviceError
-from hal.messages import STOP, Twist
-from robot.core2 import messages
-from robot.core2.board import FIRMWARE, Board, Readings
-from robot.core2.contact import SILENCE_S, Contact, State
-from robot.core2.guard import Guard
-from robot.core2.rosserial import ASK_TOPICS, encode_frame, parse_frames
-from robot.line import Line
-from robot.settings import BaseSettings
+from lira.hal.errors import DeviceError
+from lira.hal.messages import STOP, Twist
+from lira.robot.core2 import messages
+from lira.robot.core2.board import FIRMWARE, Board, Readings
+from lira.robot.core2.contact import SILENCE_S, Contact, State
+from lira.robot.core2.rosserial import ASK_TOPICS, encode_frame, parse_frames
+from lira.robot.core2.watchdog import Guard
+from lira.robot.serial_port import Line
+from lira.robot.settings import BaseSettings
 
 # Firmware 0.14.3 to 0.16.2; older; UpBoard.
 BAUDS = (525000, 500000, 460800)

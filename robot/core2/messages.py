@@ -8,9 +8,9 @@ from rosbags.serde import SerdeError
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 from rosbags.typesys.store import Typestore
 
-from hal.errors import SensorError
-from hal.messages import BatteryState, Imu, Range, Twist
-from robot.core2.wheels import Pose
+from lira.hal.errors import SensorError
+from lira.hal.messages import BatteryState, Imu, Range, Twist
+from lira.robot.core2.wheels import Pose
 
 # Before Noetic the battery's message had no temperatures.
 _OLD_BATTERY = """Header header

@@ -3,8 +3,8 @@
 import math
 from dataclasses import dataclass
 
-from hal.messages import Odometry
-from robot.settings import BaseSettings
+from lira.hal.messages import Odometry
+from lira.robot.settings import BaseSettings
 
 # Nobody drives so far between two poses: the board began to count anew.
 JUMP_M = 0.3

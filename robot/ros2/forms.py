@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from hal.messages import CompressedImage, LaserScan
+from lira.hal.messages import CompressedImage, LaserScan
 
 PNG_START = b"\x89PNG"
 FULL_RAD = math.tau - 0.1  # a scan of a whole turn may leave a beam or two out

@@ -6,14 +6,14 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any
 
-from hal.bus import Bus, Publisher, Reader
-from hal.clock import ClockEstimate, is_fresh
-from hal.errors import BusError, ConfigError, DeviceError
-from hal.messages import STOP, Applied, Command, Observation, Reason, Twist, TwistStamped
-from hal.port import DeviceHealth
-from hal.profile import RobotProfile
-from hal.topics import BATTERY, CAMERA, CMD_VEL, IMU, ODOM, SCAN, SENSOR, Topic
-from robot.ros2.forms import placed_scan, plain_picture
+from lira.hal.bus.bus import Bus, Publisher, Reader
+from lira.hal.bus.clock import ClockEstimate, is_fresh
+from lira.hal.bus.topics import BATTERY, CAMERA, CMD_VEL, IMU, ODOM, SCAN, SENSOR, Topic
+from lira.hal.errors import BusError, ConfigError, DeviceError
+from lira.hal.messages import STOP, Applied, Command, Observation, Reason, Twist, TwistStamped
+from lira.hal.port import DeviceHealth
+from lira.hal.profile import RobotProfile
+from lira.robot.ros2.forms import placed_scan, plain_picture
 
 SENSED: dict[str, Topic[Any]] = {"scan": SCAN, "camera": CAMERA, "odom": ODOM, "imu": IMU, "battery": BATTERY}
 NEEDED = {"scan": "lidar", "camera": "camera"}

@@ -11,15 +11,15 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from hal.errors import DeviceError
-from hal.messages import LaserScan
-from hal.profile import Lidar
-from robot.line import Line
-from robot.rplidar import protocol
-from robot.rplidar.points import PARSERS, Parser
-from robot.rplidar.protocol import Answer, Conf, Health, Info, Request
-from robot.rplidar.turn import Mounting, TurnCutter, scan_of
-from robot.settings import LidarSettings
+from lira.hal.errors import DeviceError
+from lira.hal.messages import LaserScan
+from lira.hal.profile import Lidar
+from lira.robot.rplidar import protocol
+from lira.robot.rplidar.points import PARSERS, Parser
+from lira.robot.rplidar.protocol import Answer, Conf, Health, Info, Request
+from lira.robot.rplidar.turn import Mounting, TurnCutter, scan_of
+from lira.robot.serial_port import Line
+from lira.robot.settings import LidarSettings
 
 BAUDS = (115200, 256000)
 ANSWER_S = 0.5

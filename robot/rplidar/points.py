@@ -14,7 +14,7 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from robot.rplidar.protocol import Answer
+from lira.robot.rplidar.protocol import Answer
 
 Floats = NDArray[np.float64]
 Bytes = NDArray[np.uint8]

@@ -5,9 +5,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from hal.messages import FloatArray, LaserScan
-from hal.profile import Lidar
-from robot.rplidar.points import Floats
+from lira.hal.messages import FloatArray, LaserScan
+from lira.hal.profile import Lidar
+from lira.robot.rplidar.points import Floats
 
 # A turn with fewer points than this share of its beams has lost too much to be shown.
 LEAST_SHARE = 0.3

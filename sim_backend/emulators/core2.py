@@ -9,8 +9,8 @@ import struct
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from hal.messages import STOP, Odometry, Twist
-from sim_backend.emulators.rosserial import Reader, encode, header, log, pack_string, topic_info, unpack_string
+from lira.hal.messages import STOP, Odometry, Twist
+from lira.sim_backend.emulators.rosserial import Reader, encode, header, log, pack_string, topic_info, unpack_string
 
 BOOT_S = 2.0
 BOOT_TEXT = b"\x00\xffrosbot firmware 0.16.2\r\n" + bytes(range(0x80, 0xFF))

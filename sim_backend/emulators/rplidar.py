@@ -9,7 +9,7 @@ from operator import xor
 
 import numpy as np
 
-from sim_backend.polyline import Floats
+from lira.sim_backend.polyline import Floats
 
 MODEL_A2M8 = 0x28
 SERIAL = bytes(range(0xA0, 0xB0))

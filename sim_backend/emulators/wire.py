@@ -13,7 +13,7 @@ import tty
 from pathlib import Path
 from typing import Protocol
 
-from hal.errors import DeviceError
+from lira.hal.errors import DeviceError
 
 TICK_S = 0.002
 READ_SIZE = 4096

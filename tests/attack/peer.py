@@ -13,9 +13,9 @@ from pathlib import Path
 import zenoh
 from zenoh.handlers import RingChannel
 
-from hal.bus import Bus, Publisher
-from hal.messages import HELD, STOP, Command, Reason, Twist
-from hal.remote import RemoteRobot
+from lira.hal.bus.bus import Bus, Publisher
+from lira.hal.client.remote import RemoteRobot
+from lira.hal.messages import HELD, STOP, Command, Reason, Twist
 
 GO = Twist(0.15, 0.0)
 PERIOD_S = 0.03

@@ -7,7 +7,7 @@ import uuid
 from contextlib import ExitStack
 from pathlib import Path
 
-from tools.processes import ChildProcess, free_port
+from lira.tools.launch.processes import ChildProcess, free_port
 
 HERE = Path(__file__).parent
 READY_S = 60.0

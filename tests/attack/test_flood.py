@@ -5,9 +5,9 @@ import time
 import pytest
 from scene import Scene, kill, moved_on_s
 
-from hal.bus import Bus
-from hal.desk import info_from_json
-from hal.topics import CMD_VEL, ESTOP_PRESS, ESTOP_RELEASE, INFO, RESET, TELEOP, TOPICS
+from lira.hal.bus.bus import Bus
+from lira.hal.bus.topics import CMD_VEL, ESTOP_PRESS, ESTOP_RELEASE, INFO, RESET, TELEOP, TOPICS
+from lira.hal.server.info_service import info_from_json
 
 ROUNDS = 2
 FLOOD_S = 1.5

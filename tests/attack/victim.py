@@ -10,11 +10,11 @@ from contextlib import ExitStack, closing
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
-from hal.bus import Bus
-from hal.governed import GovernedRobot
-from hal.null import NullRobot
-from hal.profile import load_profile
-from hal.server import HalServer, stop_on_signal
+from lira.hal.bus.bus import Bus
+from lira.hal.profile import load_profile
+from lira.hal.safety.governed import GovernedRobot
+from lira.hal.server.server import HalServer, stop_on_signal
+from lira.hal.testing import NullRobot
 
 PROFILE = load_profile("thesis-sim")
 
@@ -48,20 +48,20 @@ def make(kind, far, stack):
         sys.path.insert(0, str(Path(__file__).parents[1] / "robot"))
         from ros2_peer import Peer
 
-        from robot.ros2.robot import Interface, Ros2Robot
+        from lira.robot.ros2.robot import Interface, Ros2Robot
 
         stack.enter_context(closing(Peer(far)))
         bus = stack.enter_context(closing(Bus("far", connect=f"127.0.0.1:{far}", prefix="")))
         return Ros2Robot(PROFILE, bus, Interface()), None
-    from sim_backend.twin import Twin
+    from lira.sim_backend.twin import Twin
 
     twin = Twin(PROFILE, "line", realtime_factor=1.0)
     if kind == "twin":
         return twin, twin
-    from robot.rosbot import Devices, Rosbot
-    from robot.settings import BaseSettings, LidarSettings, Settings
-    from sim_backend.emulators.bench import WiredTwin
-    from sim_backend.emulators.core2 import Firmware
+    from lira.robot.rosbot import Devices, Rosbot
+    from lira.robot.settings import BaseSettings, LidarSettings, Settings
+    from lira.sim_backend.emulators.core2 import Firmware
+    from lira.sim_backend.emulators.wired_twin import WiredTwin
 
     folder = Path(stack.enter_context(TemporaryDirectory()))
     wired = stack.enter_context(closing(WiredTwin(twin, folder, firmware=Firmware(boot_s=0.05))))

@@ -9,19 +9,19 @@ from dataclasses import dataclass
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
-from hal.bus import Bus
-from hal.governed import GovernedRobot
-from hal.null import NullRobot
-from hal.port import Arena, Robot
-from hal.profile import load_profile
-from hal.remote import RemoteArena, RemoteRobot
-from hal.server import HalServer
-from robot.rosbot import Devices, Rosbot
-from robot.settings import BaseSettings, LidarSettings, Settings
-from sim_backend.emulators.bench import WiredTwin
-from sim_backend.emulators.core2 import Firmware
-from sim_backend.twin import Twin
-from tools.processes import free_port
+from lira.hal.bus.bus import Bus
+from lira.hal.client.remote import RemoteArena, RemoteRobot
+from lira.hal.port import Arena, Robot
+from lira.hal.profile import load_profile
+from lira.hal.safety.governed import GovernedRobot
+from lira.hal.server.server import HalServer
+from lira.hal.testing import NullRobot
+from lira.robot.rosbot import Devices, Rosbot
+from lira.robot.settings import BaseSettings, LidarSettings, Settings
+from lira.sim_backend.emulators.core2 import Firmware
+from lira.sim_backend.emulators.wired_twin import WiredTwin
+from lira.sim_backend.twin import Twin
+from lira.tools.launch.processes import free_port
 
 PROFILE = load_profile("thesis-sim")
 

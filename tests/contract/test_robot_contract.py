@@ -5,10 +5,10 @@ import math
 import pytest
 from robots import REAL_TIME, ROBOTS, STEPPED, Rig
 
-from hal.errors import LiraError
-from hal.governor import is_neutral
-from hal.messages import STOP, Applied, Command, Episode, Reason, Source, Twist
-from hal.port import Arena, Robot
+from lira.hal.errors import LiraError
+from lira.hal.messages import STOP, Applied, Command, Episode, Reason, Source, Twist
+from lira.hal.port import Arena, Robot
+from lira.hal.safety.governor import is_neutral
 
 STEPS = 15  # more than any robot needs to do as told, over any bus
 

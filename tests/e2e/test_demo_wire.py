@@ -2,8 +2,8 @@
 
 import pytest
 
-from fusion.record import LapRecord, ResultRecord, StepRecord, read_run
-from tools.processes import ChildProcess, lira_command
+from lira.fusion.log.run_log import LapRecord, ResultRecord, StepRecord, read_run
+from lira.tools.launch.processes import ChildProcess, lira_command
 
 WORLD = """
 description = "A few metres of straight line with one box on it"

@@ -6,11 +6,11 @@ import uuid
 
 import pytest
 
-from hal.bus import Bus
-from hal.messages import STOP, Reason
-from hal.profile import STOP_BUDGET_S
-from hal.topics import APPLIED, SIM_STATE
-from tools.processes import ChildProcess, free_port, lira_command
+from lira.hal.bus.bus import Bus
+from lira.hal.bus.topics import APPLIED, SIM_STATE
+from lira.hal.messages import STOP, Reason
+from lira.hal.profile import STOP_BUDGET_S
+from lira.tools.launch.processes import ChildProcess, free_port, lira_command
 
 READY_S = 60.0
 SLACK_S = 0.05  # the wheels are looked at 20 times a second

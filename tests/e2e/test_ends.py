@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from tools.processes import ChildProcess, free_port, lira_command
+from lira.tools.launch.processes import ChildProcess, free_port, lira_command
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "robot"))
 

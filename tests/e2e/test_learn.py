@@ -7,20 +7,20 @@ import pytest
 import torch
 from safetensors.numpy import load_file
 
-from fusion.control import ControlLoop
-from fusion.demonstrations import DemonstrationLog
-from fusion.journal import Journal
-from fusion.presets import METHODS
-from fusion.record import LapRecord, ResultRecord, RunRecord, RunWriter, StepRecord, read_run
-from fusion.session import Same, Session
-from fusion.teacher import SKILLED
-from fusion.trainer import ProcessTrainer
-from hal.governed import GovernedRobot
-from hal.profile import load_profile
-from sim_backend.catalogue import load_world
-from sim_backend.twin import Twin
-from tools.assembly import apprentice, lap, teacher
-from tools.processes import ChildProcess, lira_command
+from lira.fusion.control import ControlLoop
+from lira.fusion.learning.trainer import ProcessTrainer
+from lira.fusion.log.label_log import DemonstrationLog
+from lira.fusion.log.recorder import Journal
+from lira.fusion.log.run_log import LapRecord, ResultRecord, RunRecord, RunWriter, StepRecord, read_run
+from lira.fusion.methods.presets import METHODS
+from lira.fusion.teaching.session import Same, Session
+from lira.fusion.teaching.teacher import SKILLED
+from lira.hal.profile import load_profile
+from lira.hal.safety.governed import GovernedRobot
+from lira.sim_backend.catalogue import load_world
+from lira.sim_backend.twin import Twin
+from lira.tools.launch.processes import ChildProcess, lira_command
+from lira.tools.runs.build import apprentice, lap, teacher
 
 WORLD = """
 description = "A short straight line with one box on it"

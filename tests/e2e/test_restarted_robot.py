@@ -7,11 +7,11 @@ from contextlib import contextmanager
 
 import pytest
 
-from fusion.demonstrations import read_demonstrations
-from hal.bus import Bus
-from hal.messages import STOP, Command, Source, Twist
-from hal.remote import RemoteRobot
-from tools.processes import ChildProcess, free_port, lira_command
+from lira.fusion.log.label_log import read_demonstrations
+from lira.hal.bus.bus import Bus
+from lira.hal.client.remote import RemoteRobot
+from lira.hal.messages import STOP, Command, Source, Twist
+from lira.tools.launch.processes import ChildProcess, free_port, lira_command
 
 READY_S = 90.0
 SPEED = 5.0  # the first robot's clock is soon so far that nobody would wait for it
@@ -36,7 +36,7 @@ class Place:
     @contextmanager
     def learner(self):
         words = ["--name", self.name, "--connect", self.endpoint, "--method", "lira", "--run", str(self.folder / "run")]
-        with ChildProcess("the learner", lira_command("fusion", *words), self.folder / "fusion.log") as learner:
+        with ChildProcess("the learner", lira_command("fusion", *words), self.folder / "lira.fusion.log") as learner:
             learner.wait_ready("learns on", READY_S)
             yield learner
 

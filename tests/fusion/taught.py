@@ -2,9 +2,9 @@
 
 import numpy as np
 
-from fusion.method import Expert
-from fusion.novice import LearningSettings, NetworkNovice
-from fusion.preprocess import Features
+from lira.fusion.learning.novice import LearningSettings, NetworkNovice
+from lira.fusion.methods.base import Expert
+from lira.fusion.preprocess import Features
 
 FEATURES = Features(np.full(101, 0.9, np.float32), np.full((32, 32), 0.5, np.float32))
 

@@ -5,11 +5,11 @@ import numpy as np
 import pytest
 from safetensors.numpy import save_file
 
-from fusion.checkpoint import Checkpoint, load_checkpoint, save_checkpoint
-from fusion.expert_files import shipped_path
-from fusion.networks import CameraNet, FusionNet, LidarNet
-from hal.errors import StorageError
-from hal.profile import load_profile
+from lira.fusion.experts.files import shipped_path
+from lira.fusion.policies.checkpoint import Checkpoint, load_checkpoint, save_checkpoint
+from lira.fusion.policies.networks import CameraNet, FusionNet, LidarNet
+from lira.hal.errors import StorageError
+from lira.hal.profile import load_profile
 
 SCAN = np.random.default_rng(0).random(101, dtype=np.float32)
 IMAGE = np.random.default_rng(1).random((32, 32), dtype=np.float32)

@@ -2,12 +2,12 @@ from dataclasses import replace
 
 import pytest
 
-from fusion.control import ControlLoop, to_action, to_twist
-from fusion.method import Choice, Lesson, Proposal
-from hal.governed import GovernedRobot
-from hal.messages import Reason, Source, Twist
-from hal.null import NullRobot
-from hal.profile import load_profile
+from lira.fusion.control import ControlLoop, to_action, to_twist
+from lira.fusion.methods.base import Choice, Lesson, Proposal
+from lira.hal.messages import Reason, Source, Twist
+from lira.hal.profile import load_profile
+from lira.hal.safety.governed import GovernedRobot
+from lira.hal.testing import NullRobot
 
 PROFILE = load_profile("thesis-sim")
 BASE = PROFILE.base

@@ -12,9 +12,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from fusion.demonstrations import Demonstration, DemonstrationLog, read_demonstrations
-from hal.errors import StorageError
-from hal.profile import load_profile
+from lira.fusion.log.label_log import Demonstration, DemonstrationLog, read_demonstrations
+from lira.hal.errors import StorageError
+from lira.hal.profile import load_profile
 
 SIM = load_profile("thesis-sim")
 REAL = load_profile("rosbot2")
@@ -84,7 +84,7 @@ WRITER = """
     import sys
     from pathlib import Path
     from test_demonstrations import SIM, demonstration
-    from fusion.demonstrations import DemonstrationLog
+    from lira.fusion.log.label_log import DemonstrationLog
     log = DemonstrationLog(Path(sys.argv[1]), SIM)
     k = log.count
     while True:
@@ -207,8 +207,8 @@ LIMITED_WRITER = """
     import json, resource, signal, sys
     from pathlib import Path
     from test_demonstrations import SIM, demonstration
-    from fusion.demonstrations import DemonstrationLog
-    from hal.errors import StorageError
+    from lira.fusion.log.label_log import DemonstrationLog
+    from lira.hal.errors import StorageError
     signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
     resource.setrlimit(resource.RLIMIT_FSIZE, (20_000, resource.RLIM_INFINITY))
     errors = []

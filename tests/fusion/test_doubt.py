@@ -7,12 +7,12 @@ import pytest
 import torch
 from taught import FEATURES, make_novice
 
-from fusion.doubt import Doubtful, DoubtLog, doubt, threshold
-from fusion.ensemble import EnsembleNet
-from fusion.hg_dagger import HgDagger
-from fusion.learner import Label, Learner
-from fusion.method import STAND, Call
-from fusion.networks import CameraNet, FusionNet, LidarNet
+from lira.fusion.learning.learner import Label, Learner
+from lira.fusion.methods.base import STAND, Call
+from lira.fusion.methods.doubt import Doubtful, DoubtLog, doubt, threshold
+from lira.fusion.methods.hg_dagger import HgDagger
+from lira.fusion.policies.ensemble import EnsembleNet
+from lira.fusion.policies.networks import CameraNet, FusionNet, LidarNet
 
 
 def opinions(spread):

@@ -1,18 +1,18 @@
 import numpy as np
 import pytest
 
-from fusion.checkpoint import Checkpoint, save_checkpoint
-from fusion.doubt import Doubtful
-from fusion.expert_files import folder_of
-from fusion.experts import as_expert, load_alone, load_expert, load_network
-from fusion.kernel_net import KernelNet
-from fusion.method import Alone
-from fusion.networks import CameraNet, FusionNet, LidarNet
-from fusion.preprocess import Features
-from fusion.tasks import DEFAULT, TASKS, task_of
-from hal.errors import ConfigError, StorageError
-from hal.profile import load_profile
-from sim_backend.catalogue import load_world
+from lira.fusion.experts.files import folder_of
+from lira.fusion.experts.load import as_expert, load_alone, load_expert, load_network
+from lira.fusion.experts.tasks import DEFAULT, TASKS, task_of
+from lira.fusion.methods.base import Alone
+from lira.fusion.methods.doubt import Doubtful
+from lira.fusion.policies.checkpoint import Checkpoint, save_checkpoint
+from lira.fusion.policies.kernel_net import KernelNet
+from lira.fusion.policies.networks import CameraNet, FusionNet, LidarNet
+from lira.fusion.preprocess import Features
+from lira.hal.errors import ConfigError, StorageError
+from lira.hal.profile import load_profile
+from lira.sim_backend.catalogue import load_world
 
 SIM, REAL = load_profile("thesis-sim"), load_profile("rosbot2")
 FEATURES = Features(np.full(101, 0.5, np.float32), np.full((32, 32), 0.5, np.float32))

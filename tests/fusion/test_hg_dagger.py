@@ -1,11 +1,11 @@
 import numpy as np
 import pytest
 
-from fusion.hg_dagger import HgDagger
-from fusion.method import STAND, Call
-from fusion.networks import CameraNet
-from fusion.novice import LearningSettings, NetworkNovice
-from fusion.preprocess import Features
+from lira.fusion.learning.novice import LearningSettings, NetworkNovice
+from lira.fusion.methods.base import STAND, Call
+from lira.fusion.methods.hg_dagger import HgDagger
+from lira.fusion.policies.networks import CameraNet
+from lira.fusion.preprocess import Features
 
 FEATURES = Features(np.zeros(101, np.float32), np.zeros((32, 32), np.float32))
 FAR = (-1.0, 1.0)  # from anything a fresh network does

@@ -3,12 +3,12 @@
 import numpy as np
 import pytest
 
-from fusion.hg_dagger import HgDagger
-from fusion.lira import PRESETS, LiraSpf
-from fusion.method import Expert
-from fusion.networks import CameraNet
-from fusion.novice import LearningSettings, NetworkNovice
-from fusion.preprocess import Features
+from lira.fusion.learning.novice import LearningSettings, NetworkNovice
+from lira.fusion.methods.base import Expert
+from lira.fusion.methods.hg_dagger import HgDagger
+from lira.fusion.methods.lira import PRESETS, LiraSpf
+from lira.fusion.policies.networks import CameraNet
+from lira.fusion.preprocess import Features
 
 FEATURES = Features(np.zeros(101, np.float32), np.zeros((32, 32), np.float32))
 REST, CREEP = (0.0, 0.0), (0.0, 0.01)

@@ -3,11 +3,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from fusion.control import Step
-from fusion.journal import Journal
-from fusion.method import Call, Choice, Lesson, Proposal
-from fusion.preprocess import Features
-from hal.messages import STOP, Applied, CourseState, ExpertView, LabelCounts, Observation
+from lira.fusion.control import Step
+from lira.fusion.log.recorder import Journal
+from lira.fusion.methods.base import Call, Choice, Lesson, Proposal
+from lira.fusion.preprocess import Features
+from lira.hal.messages import STOP, Applied, CourseState, ExpertView, LabelCounts, Observation
 
 IMAGE = (np.arange(32 * 32).reshape(32, 32) % 256 / 255).astype(np.float32)
 FEATURES = Features(np.linspace(0, 1, 101, dtype=np.float32), IMAGE)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import torch
 
-from fusion.kernel import GAINS, KernelRidge, KernelSettings, kernel, unit
+from lira.fusion.policies.kernel import GAINS, KernelRidge, KernelSettings, kernel, unit
 
 CAMERA, LIDAR = 6, 4
 PLAIN = KernelSettings(contradicts=None)

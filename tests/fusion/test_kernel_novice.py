@@ -6,16 +6,16 @@ import numpy as np
 import pytest
 import torch
 
-from fusion.checkpoint import Checkpoint, build, load_checkpoint, save_checkpoint
-from fusion.kernel import KernelSettings
-from fusion.kernel_net import KernelNet
-from fusion.kernel_novice import KernelNovice
-from fusion.labels import Label, mirror
-from fusion.networks import CameraNet, LidarNet
-from fusion.novice import LearningSettings
-from fusion.preprocess import Features
-from hal.errors import StorageError
-from tools.run_folder import aside_words
+from lira.fusion.learning.kernel_novice import KernelNovice
+from lira.fusion.learning.labels import Label, mirror
+from lira.fusion.learning.novice import LearningSettings
+from lira.fusion.policies.checkpoint import Checkpoint, build, load_checkpoint, save_checkpoint
+from lira.fusion.policies.kernel import KernelSettings
+from lira.fusion.policies.kernel_net import KernelNet
+from lira.fusion.policies.networks import CameraNet, LidarNet
+from lira.fusion.preprocess import Features
+from lira.hal.errors import StorageError
+from lira.tools.runs.folder import aside_words
 
 BINS, FILTERS = 21, 4
 

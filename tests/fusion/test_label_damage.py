@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 from test_demonstrations import REAL, SIM, demonstration, holds, record_bytes, same, write
 
-from fusion.demonstrations import DemonstrationLog, check_log, read_demonstrations, repair_log
-from hal.errors import StorageError
+from lira.fusion.log.label_log import DemonstrationLog, check_log, read_demonstrations, repair_log
+from lira.hal.errors import StorageError
 
 COUNT = 8
 
@@ -125,7 +125,7 @@ def test_damage_that_cannot_be_healed_leaves_the_file(tmp_path, log, monkeypatch
         raise OSError(28, "No space left on device")
 
     with monkeypatch.context() as patch:
-        patch.setattr("fusion.label_salvage.os.fsync", full)
+        patch.setattr("lira.fusion.log.label_salvage.os.fsync", full)
         with pytest.raises(StorageError, match=r"damaged .* cannot be written anew: No space left") as refused:
             DemonstrationLog(path, SIM)
     assert "left as it is" in refused.value.remedy

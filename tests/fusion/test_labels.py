@@ -2,9 +2,9 @@ import numpy as np
 import pytest
 import torch
 
-from fusion.labels import Label, is_rest, mirror
-from fusion.learner import Learner
-from fusion.networks import CameraNet, FusionNet, LidarNet
+from lira.fusion.learning.labels import Label, is_rest, mirror
+from lira.fusion.learning.learner import Learner
+from lira.fusion.policies.networks import CameraNet, FusionNet, LidarNet
 
 
 @pytest.fixture(autouse=True)

@@ -3,8 +3,8 @@ import pytest
 import torch
 from torch import nn
 
-from fusion.learner import Label, Learner
-from fusion.networks import CameraNet, FusionNet, LidarNet
+from lira.fusion.learning.learner import Label, Learner
+from lira.fusion.policies.networks import CameraNet, FusionNet, LidarNet
 
 SIZES = (101, 16)
 
@@ -109,7 +109,7 @@ def test_full_training_stays_close_to_plain_float32(monkeypatch):
     """Half-precision convolutions, where the processor has them, change little."""
     made, fresh = labels(60), labels(50, seed=9)
     fast = trained(FusionNet(*SIZES), made=made, steps=3).weights()
-    monkeypatch.setattr("fusion.learner._has_bfloat16", lambda: False)
+    monkeypatch.setattr("lira.fusion.learning.learner._has_bfloat16", lambda: False)
     exact = trained(FusionNet(*SIZES), made=made, steps=3).weights()
     networks = FusionNet(*SIZES), FusionNet(*SIZES)
     for network, weights in zip(networks, (fast, exact), strict=True):

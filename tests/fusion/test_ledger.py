@@ -4,8 +4,8 @@ from dataclasses import replace
 
 import pytest
 
-from fusion.ledger import Account, Ledger
-from fusion.method import Call, Choice, Lesson, Proposal, Settled
+from lira.fusion.log.counts import Account, Ledger
+from lira.fusion.methods.base import Call, Choice, Lesson, Proposal, Settled
 
 PERIOD_S = 0.2
 SCRIPT = {

@@ -5,12 +5,12 @@ import itertools
 import numpy as np
 import pytest
 
-from fusion.ledger import Ledger
-from fusion.lira import PRESETS, LiraSettings, LiraSpf, activation, choose, in_consensus
-from fusion.method import Call, Expert
-from fusion.novice import LearningSettings, NetworkNovice, is_redundant
-from fusion.preprocess import Features
-from hal.messages import ExpertView
+from lira.fusion.learning.novice import LearningSettings, NetworkNovice, is_redundant
+from lira.fusion.log.counts import Ledger
+from lira.fusion.methods.base import Call, Expert
+from lira.fusion.methods.lira import PRESETS, LiraSettings, LiraSpf, activation, choose, in_consensus
+from lira.fusion.preprocess import Features
+from lira.hal.messages import ExpertView
 
 T = 0.20
 NOVICE = (0.9, -0.3)

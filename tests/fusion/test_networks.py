@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 import torch
 
-from fusion.networks import CameraNet, FusionNet, LidarNet
+from lira.fusion.policies.networks import CameraNet, FusionNet, LidarNet
 
 RNG = np.random.default_rng(0)
 SCAN = RNG.random(101, dtype=np.float32)

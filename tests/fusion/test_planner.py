@@ -5,13 +5,13 @@ import math
 import numpy as np
 import pytest
 
-from fusion.control import to_twist
-from fusion.planner import STAGES_S, Planner, action_sequences
-from hal.messages import Command, Episode
-from hal.profile import load_profile
-from sim_backend.foresight import Foresight
-from sim_backend.twin import Twin
-from sim_backend.world import Box, Limits, Line, Piece, World
+from lira.fusion.control import to_twist
+from lira.fusion.teaching.planner import STAGES_S, Planner, action_sequences
+from lira.hal.messages import Command, Episode
+from lira.hal.profile import load_profile
+from lira.sim_backend.foresight import Foresight
+from lira.sim_backend.twin import Twin
+from lira.sim_backend.world import Box, Limits, Line, Piece, World
 
 PROFILE = load_profile("thesis-sim")
 PERIOD_S = PROFILE.period_s

@@ -3,13 +3,13 @@
 import numpy as np
 import pytest
 
-from fusion.journal import Journal
-from fusion.lira import LiraSettings, LiraSpf
-from fusion.method import Call, Chooser, Expert
-from fusion.networks import FusionNet
-from fusion.novice import LearningSettings, NetworkNovice
-from fusion.plus import LiraPlus, PlusSettings
-from fusion.preprocess import Features
+from lira.fusion.learning.novice import LearningSettings, NetworkNovice
+from lira.fusion.log.recorder import Journal
+from lira.fusion.methods.base import Call, Chooser, Expert
+from lira.fusion.methods.lira import LiraSettings, LiraSpf
+from lira.fusion.methods.plus import LiraPlus, PlusSettings
+from lira.fusion.policies.networks import FusionNet
+from lira.fusion.preprocess import Features
 
 PERIOD_S = 0.2
 BINS = 101
@@ -154,8 +154,8 @@ class TestReservation:
 
 @pytest.fixture
 def taken():
-    from fusion.control import Step
-    from hal.messages import Applied, Observation, Reason, Source, Twist
+    from lira.fusion.control import Step
+    from lira.hal.messages import Applied, Observation, Reason, Source, Twist
 
     def take(scene, seq, human=None):
         proposal, lesson = scene.step(human)

@@ -7,10 +7,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from fusion.preprocess import Preprocessor, bin_scan, from_uint8, gray_image, to_uint8
-from hal.errors import SensorError
-from hal.messages import CompressedImage, Image, LaserScan, Observation
-from hal.profile import load_profile
+from lira.fusion.preprocess import Preprocessor, bin_scan, from_uint8, gray_image, to_uint8
+from lira.hal.errors import SensorError
+from lira.hal.messages import CompressedImage, Image, LaserScan, Observation
+from lira.hal.profile import load_profile
 
 SIM = load_profile("thesis-sim")
 REAL = load_profile("rosbot2")

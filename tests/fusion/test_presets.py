@@ -1,11 +1,11 @@
 import msgspec
 import pytest
 
-from fusion.hg_dagger import HgDaggerSettings
-from fusion.lira import LiraSettings
-from fusion.presets import ALIASES, METHODS, Method, method_named
-from fusion.syllabus import FRESH
-from hal.errors import ConfigError
+from lira.fusion.methods.hg_dagger import HgDaggerSettings
+from lira.fusion.methods.lira import LiraSettings
+from lira.fusion.methods.presets import ALIASES, METHODS, Method, method_named
+from lira.fusion.methods.syllabus import FRESH
+from lira.hal.errors import ConfigError
 
 
 def test_every_method_goes_through_json_as_it_is():

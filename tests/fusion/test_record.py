@@ -2,9 +2,9 @@ import math
 
 import pytest
 
-from fusion.record import LapRecord, Pose, ResultRecord, RunRecord, RunWriter, StepRecord, read_run
-from hal.errors import StorageError
-from hal.messages import CourseState, Decision, ExpertView, LabelCounts
+from lira.fusion.log.run_log import LapRecord, Pose, ResultRecord, RunRecord, RunWriter, StepRecord, read_run
+from lira.hal.errors import StorageError
+from lira.hal.messages import CourseState, Decision, ExpertView, LabelCounts
 
 DECISION = Decision(
     0.4, 2, "human", "feedback", (0.5, -1.0), (0.4, 0.0), (0.5, -1.0), (ExpertView("camera", (1.0, 0.0), 0.1, True),),

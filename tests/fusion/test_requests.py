@@ -8,19 +8,19 @@ from types import MappingProxyType
 
 import pytest
 
-from fusion.control import ControlLoop
-from fusion.journal import Journal
-from fusion.method import Alone
-from fusion.requests import RequestDesk, RequestLine
-from fusion.service import serve
-from hal.bus import Bus
-from hal.codec import encode
-from hal.errors import BusError, StorageError
-from hal.messages import STOP, OperatorRequest, Reason, Request, Twist
-from hal.null import NullRobot
-from hal.profile import load_profile
-from hal.topics import OPERATOR, OPERATOR_ANSWER
-from tools.processes import free_port
+from lira.fusion.control import ControlLoop
+from lira.fusion.log.recorder import Journal
+from lira.fusion.methods.base import Alone
+from lira.fusion.operator_service import RequestDesk, RequestLine
+from lira.fusion.service import serve
+from lira.hal.bus.bus import Bus
+from lira.hal.bus.topics import OPERATOR, OPERATOR_ANSWER
+from lira.hal.errors import BusError, StorageError
+from lira.hal.messages import STOP, OperatorRequest, Reason, Request, Twist
+from lira.hal.messages.codec import encode
+from lira.hal.profile import load_profile
+from lira.hal.testing import NullRobot
+from lira.tools.launch.processes import free_port
 
 PROFILE = load_profile("thesis-sim")
 GO = (0.5, 0.0)

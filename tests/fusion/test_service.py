@@ -10,18 +10,18 @@ import cv2
 import numpy as np
 import pytest
 
-from fusion.control import ControlLoop
-from fusion.journal import Journal
-from fusion.method import Alone
-from fusion.service import serve
-from hal.bus import Bus
-from hal.governed import GovernedRobot
-from hal.messages import STOP, CompressedImage, Reason, Twist
-from hal.null import NullRobot
-from hal.profile import load_profile
-from hal.remote import RemoteRobot
-from hal.server import HalServer
-from tools.processes import free_port
+from lira.fusion.control import ControlLoop
+from lira.fusion.log.recorder import Journal
+from lira.fusion.methods.base import Alone
+from lira.fusion.service import serve
+from lira.hal.bus.bus import Bus
+from lira.hal.client.remote import RemoteRobot
+from lira.hal.messages import STOP, CompressedImage, Reason, Twist
+from lira.hal.profile import load_profile
+from lira.hal.safety.governed import GovernedRobot
+from lira.hal.server.server import HalServer
+from lira.hal.testing import NullRobot
+from lira.tools.launch.processes import free_port
 
 PROFILE = load_profile("thesis-sim")
 JPEG = cv2.imencode(".jpg", np.full((32, 32), 128, np.uint8))[1].tobytes()

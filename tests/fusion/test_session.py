@@ -5,16 +5,16 @@ from dataclasses import replace
 
 import pytest
 
-from fusion.control import ControlLoop
-from fusion.journal import Journal
-from fusion.method import Call, Choice, Lesson, Proposal
-from fusion.record import LapRecord
-from fusion.session import LOST_OBSERVATIONS, PUT_BACK_M, PUT_ON_M, Drive, Same, Session
-from hal.errors import DeviceError
-from hal.governed import GovernedRobot
-from hal.messages import Episode
-from hal.null import NullRobot
-from hal.profile import load_profile
+from lira.fusion.control import ControlLoop
+from lira.fusion.log.recorder import Journal
+from lira.fusion.log.run_log import LapRecord
+from lira.fusion.methods.base import Call, Choice, Lesson, Proposal
+from lira.fusion.teaching.session import LOST_OBSERVATIONS, PUT_BACK_M, PUT_ON_M, Drive, Same, Session
+from lira.hal.errors import DeviceError
+from lira.hal.messages import Episode
+from lira.hal.profile import load_profile
+from lira.hal.safety.governed import GovernedRobot
+from lira.hal.testing import NullRobot
 
 PROFILE = load_profile("thesis-sim")
 STEP_M = PROFILE.period_s * PROFILE.base.max_linear_m_s

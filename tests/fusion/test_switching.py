@@ -3,8 +3,8 @@ from dataclasses import replace
 import numpy as np
 from taught import FEATURES
 
-from fusion.method import Call, Expert
-from fusion.switching import Switching, SwitchingSettings
+from lira.fusion.methods.base import Call, Expert
+from lira.fusion.methods.switching import Switching, SwitchingSettings
 
 CAMERA, LIDAR = (1.0, 0.1), (0.5, -0.8)
 

@@ -2,8 +2,8 @@
 
 import pytest
 
-from fusion.syllabus import FRESH, THESIS, Syllabus, with_proof
-from hal.errors import ConfigError
+from lira.fusion.methods.syllabus import FRESH, THESIS, Syllabus, with_proof
+from lira.hal.errors import ConfigError
 
 
 def test_the_thesis_teaches_and_proves_on_one_layout():

@@ -5,15 +5,15 @@ from dataclasses import dataclass, replace
 import numpy as np
 import pytest
 
-from fusion.control import to_twist
-from fusion.method import Call, Choice, Proposal
-from fusion.preprocess import Features
-from fusion.teacher import PERFECT, SKILLED, ScriptedTeacher, TeacherSettings
-from hal.messages import Command, CourseState, Episode
-from hal.profile import load_profile
-from sim_backend.foresight import Foresight
-from sim_backend.twin import Twin
-from sim_backend.world import Box, Limits, Line, Piece, World
+from lira.fusion.control import to_twist
+from lira.fusion.methods.base import Call, Choice, Proposal
+from lira.fusion.preprocess import Features
+from lira.fusion.teaching.teacher import PERFECT, SKILLED, ScriptedTeacher, TeacherSettings
+from lira.hal.messages import Command, CourseState, Episode
+from lira.hal.profile import load_profile
+from lira.sim_backend.foresight import Foresight
+from lira.sim_backend.twin import Twin
+from lira.sim_backend.world import Box, Limits, Line, Piece, World
 
 PROFILE = load_profile("thesis-sim")
 PERIOD_S = PROFILE.period_s

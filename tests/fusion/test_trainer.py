@@ -10,10 +10,10 @@ import pytest
 import torch
 from test_learner import labels
 
-from fusion.learner import Learner
-from fusion.networks import LidarNet
-from fusion.trainer import InlineTrainer, ProcessTrainer
-from hal.errors import LiraError
+from lira.fusion.learning.learner import Learner
+from lira.fusion.learning.trainer import InlineTrainer, ProcessTrainer
+from lira.fusion.policies.networks import LidarNet
+from lira.hal.errors import LiraError
 
 WAIT_S = 60.0  # for what is certain to come; only a hang takes that long
 
@@ -114,9 +114,9 @@ def test_the_process_gives_way_and_is_deaf_to_ctrl_c(real_time):
 
 CTRL_C = """
 import os, signal, threading
-from fusion.learner import Learner
-from fusion.networks import LidarNet
-from fusion.trainer import ProcessTrainer
+from lira.fusion.learning.learner import Learner
+from lira.fusion.policies.networks import LidarNet
+from lira.fusion.learning.trainer import ProcessTrainer
 
 signal.signal(signal.SIGINT, lambda *_: None)
 ready = threading.Event()
@@ -169,9 +169,9 @@ def test_closing_in_the_middle_of_a_long_training_step_is_bounded():
 
 OWNER = """
 import time
-from fusion.learner import Learner
-from fusion.networks import LidarNet
-from fusion.trainer import ProcessTrainer
+from lira.fusion.learning.learner import Learner
+from lira.fusion.policies.networks import LidarNet
+from lira.fusion.learning.trainer import ProcessTrainer
 trainer = ProcessTrainer(Learner(LidarNet(101), seed=0, frozen_trunks=False))
 print(trainer.pid, flush=True)
 time.sleep(600)

@@ -8,13 +8,13 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from hal.governed import GovernedRobot
-from hal.governor import is_neutral
-from hal.lease import session_of
-from hal.messages import STOP, Applied, Command, Reason, Source, Twist
-from hal.null import NullRobot
-from hal.port import DeviceHealth
-from hal.profile import load_profile
+from lira.hal.messages import STOP, Applied, Command, Reason, Source, Twist
+from lira.hal.port import DeviceHealth
+from lira.hal.profile import load_profile
+from lira.hal.safety.governed import GovernedRobot
+from lira.hal.safety.governor import is_neutral
+from lira.hal.safety.lease import session_of
+from lira.hal.testing import NullRobot
 
 ROSBOT = load_profile("rosbot2")
 GO = Twist(0.2, 0.0)

@@ -4,8 +4,8 @@ import random
 
 import pytest
 
-from hal.attachment import Attachment, parse_attachment
-from hal.errors import CodecError
+from lira.hal.bus.attachment import Attachment, parse_attachment
+from lira.hal.errors import CodecError
 
 
 @pytest.mark.parametrize(

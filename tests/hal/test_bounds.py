@@ -6,10 +6,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from hal.bounds import LARGEST, LONGEST_TEXT, MOST_BEAMS, MOST_ITEMS
-from hal.codec import decode, decode_json, encode
-from hal.errors import CodecError
-from hal.messages import (
+from lira.hal.bus.topics import CMD_VEL, SCAN, TOPICS
+from lira.hal.errors import CodecError
+from lira.hal.messages import (
     STOP,
     Applied,
     BatteryState,
@@ -25,7 +24,8 @@ from hal.messages import (
     Range,
     Twist,
 )
-from hal.topics import CMD_VEL, SCAN, TOPICS
+from lira.hal.messages.bounds import LARGEST, LONGEST_TEXT, MOST_BEAMS, MOST_ITEMS
+from lira.hal.messages.codec import decode, decode_json, encode
 
 NAN, INF = math.nan, math.inf
 LAP = CourseState(1.0, 0.0, 0.0, 0.0, 0.0, 0.0, NAN, NAN, INF)

@@ -8,10 +8,10 @@ import pytest
 import zenoh
 from wiring import new_endpoint, new_name, wait_for
 
-from hal.bus import Bus
-from hal.errors import BusError, ConfigError
-from hal.messages import BatteryState, Odometry, Twist
-from hal.topics import BATTERY, CMD_VEL, ODOM, TOPICS
+from lira.hal.bus.bus import Bus
+from lira.hal.bus.topics import BATTERY, CMD_VEL, ODOM, TOPICS
+from lira.hal.errors import BusError, ConfigError
+from lira.hal.messages import BatteryState, Odometry, Twist
 
 
 @pytest.fixture

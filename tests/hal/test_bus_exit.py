@@ -5,12 +5,12 @@ import sys
 
 import pytest
 
-from tools.processes import free_port
+from lira.tools.launch.processes import free_port
 
 SCRIPT = """
 import sys, time
 import numpy, torch  # a heavy import widens the time between the end of the program and the end of the process
-from hal.bus import Bus
+from lira.hal.bus.bus import Bus
 bus = Bus("nobody", connect=sys.argv[1])
 time.sleep(float(sys.argv[2]))
 bus.close()

@@ -8,9 +8,8 @@ import pytest
 from mcap.records import Schema
 from mcap_ros2.decoder import DecoderFactory
 
-from hal.codec import decode, encode, ros_type_of
-from hal.errors import CodecError
-from hal.messages import (
+from lira.hal.errors import CodecError
+from lira.hal.messages import (
     Applied,
     Clock,
     CompressedImage,
@@ -22,9 +21,10 @@ from hal.messages import (
     Twist,
     TwistStamped,
 )
-from hal.outlet import compress
-from hal.ros import CODECS, TYPES, definition
-from tools.bench.samples import DECISION, INF, MESSAGES, NAN, of_kind
+from lira.hal.messages.codec import decode, encode, ros_type_of
+from lira.hal.messages.ros_table import CODECS, TYPES, definition
+from lira.hal.server.sensor_publisher import compress
+from lira.tools.bench.samples import DECISION, INF, MESSAGES, NAN, of_kind
 
 SCAN = of_kind(LaserScan)[0]
 

@@ -5,8 +5,8 @@ from pathlib import Path
 
 import pytest
 
-from hal.config import MOST_BYTES, Table, load_json, load_toml, read_bounded, write_whole
-from hal.errors import ConfigError, StorageError
+from lira.hal.config import MOST_BYTES, Table, load_json, load_toml, read_bounded, write_whole
+from lira.hal.errors import ConfigError, StorageError
 
 
 class Small(Table, frozen=True):
@@ -100,7 +100,7 @@ def test_a_file_is_written_whole_or_not_at_all(tmp_path, monkeypatch):
         raise OSError(28, "No space left on device")
 
     with monkeypatch.context() as patch:
-        patch.setattr("hal.config.os.fsync", full)
+        patch.setattr("lira.hal.config.os.fsync", full)
         with pytest.raises(StorageError, match="No space left"):
             write_whole(path, b"third")
     assert path.read_bytes() == b"second"

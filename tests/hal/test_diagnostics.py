@@ -4,16 +4,16 @@ import time
 
 from wiring import joined, new_endpoint, real_time_null, remote, served, wait_for
 
-from hal.bus import Bus
-from hal.diagnostics import NO_DATAGRAMS, PATIENCE_S, WARN, LinkWatch
-from hal.governed import FIELD_OFF
-from hal.messages import STOP, Command
-from hal.null import NullRobot
-from hal.port import DeviceHealth
-from hal.profile import load_profile
-from hal.remote import RemoteRobot
-from hal.topics import CMD_VEL, DIAGNOSTICS
-from tools.relay import Relay
+from lira.hal.bus.bus import Bus
+from lira.hal.bus.topics import CMD_VEL, DIAGNOSTICS
+from lira.hal.client.remote import RemoteRobot
+from lira.hal.messages import STOP, Command
+from lira.hal.port import DeviceHealth
+from lira.hal.profile import load_profile
+from lira.hal.safety.governed import FIELD_OFF
+from lira.hal.server.diagnostics import NO_DATAGRAMS, PATIENCE_S, WARN, LinkWatch
+from lira.hal.testing import NullRobot
+from lira.tools.launch.link_fault import Relay
 
 
 def test_one_link_is_told_when_it_stays_so():

@@ -7,11 +7,11 @@ import msgspec
 import numpy as np
 import pytest
 
-from hal.field import Clearance, limit_speed, measure_clearance
-from hal.governed import GovernedRobot
-from hal.messages import STOP, Command, LaserScan, Reason, Twist
-from hal.null import NullRobot
-from hal.profile import load_profile
+from lira.hal.messages import STOP, Command, LaserScan, Reason, Twist
+from lira.hal.profile import load_profile
+from lira.hal.safety.governed import GovernedRobot
+from lira.hal.safety.protective_field import Clearance, limit_speed, measure_clearance
+from lira.hal.testing import NullRobot
 
 ROSBOT = load_profile("rosbot2")
 FIELD, LIDAR, BASE = ROSBOT.field, ROSBOT.lidar, ROSBOT.base

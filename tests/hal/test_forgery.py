@@ -10,14 +10,14 @@ import zenoh
 from wiring import joined, real_time_null, remote, served, wait_for
 from zenoh.handlers import FifoChannel
 
-from hal.access import access_list
-from hal.attachment import Attachment, parse_attachment
-from hal.bus import Bus
-from hal.codec import encode
-from hal.estop import look_at_estop, press_estop
-from hal.keys import Role
-from hal.messages import STOP, Applied, Command, LaserScan, Reason, Source, Twist
-from hal.topics import APPLIED, CMD_VEL, ESTOP_LOOK, ESTOP_PRESS, INFO, SCAN, TELEOP, commander_of, named
+from lira.hal.bus.access import access_list
+from lira.hal.bus.attachment import Attachment, parse_attachment
+from lira.hal.bus.bus import Bus
+from lira.hal.bus.keys import Role
+from lira.hal.bus.topics import APPLIED, CMD_VEL, ESTOP_LOOK, ESTOP_PRESS, INFO, SCAN, TELEOP, commander_of, named
+from lira.hal.messages import STOP, Applied, Command, LaserScan, Reason, Source, Twist
+from lira.hal.messages.codec import encode
+from lira.hal.server.estop_service import look_at_estop, press_estop
 
 GO, BACK = Twist(0.5, 0.0), Twist(-0.2, 0.0)
 FORGED_M = 77.0

@@ -5,10 +5,10 @@ import threading
 
 import pytest
 
-from hal.governed import GovernedRobot
-from hal.messages import STOP, Command, Reason, Source, Twist
-from hal.null import NullRobot
-from hal.profile import load_profile
+from lira.hal.messages import STOP, Command, Reason, Source, Twist
+from lira.hal.profile import load_profile
+from lira.hal.safety.governed import GovernedRobot
+from lira.hal.testing import NullRobot
 
 PROFILE = load_profile("thesis-sim")
 GO = Twist(0.5, 0.0)

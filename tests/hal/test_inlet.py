@@ -8,14 +8,14 @@ import pytest
 import zenoh
 from wiring import joined, new_endpoint, new_name, real_time_null, remote, served, wait_for
 
-from hal.attachment import Attachment
-from hal.boundary import Boundary
-from hal.bus import QUESTIONS, Bus, Reader
-from hal.codec import encode
-from hal.errors import BusError
-from hal.inlet import BURST, DEPTH, ESTOP_DEPTH, Inlet, Order
-from hal.messages import STOP, Bool, Command, Reason, Twist
-from hal.topics import CMD_VEL, ESTOP, INFO
+from lira.hal.bus.attachment import Attachment
+from lira.hal.bus.boundary import Boundary
+from lira.hal.bus.bus import QUESTIONS, Bus, Reader
+from lira.hal.bus.topics import CMD_VEL, ESTOP, INFO
+from lira.hal.errors import BusError
+from lira.hal.messages import STOP, Bool, Command, Reason, Twist
+from lira.hal.messages.codec import encode
+from lira.hal.server.command_reader import BURST, DEPTH, ESTOP_DEPTH, Inlet, Order
 
 GO = Twist(0.5, 0.0)
 

@@ -8,12 +8,12 @@ import tempfile
 import pytest
 from wiring import new_name
 
-from hal.errors import BusError
-from hal.instance import only_instance
+from lira.hal.errors import BusError
+from lira.hal.server.instance import only_instance
 
 HOLDER = """
 import sys, time
-from hal.instance import only_instance
+from lira.hal.server.instance import only_instance
 with only_instance(sys.argv[1]):
     print("held", flush=True)
     time.sleep(60)

@@ -4,9 +4,9 @@ import cv2
 import numpy as np
 import pytest
 
-from hal.errors import SensorError
-from hal.messages import DepthImage, Image
-from hal.outlet import IMAGE_LIMIT_BYTES, compress, compress_depth
+from lira.hal.errors import SensorError
+from lira.hal.messages import DepthImage, Image
+from lira.hal.server.sensor_publisher import IMAGE_LIMIT_BYTES, compress, compress_depth
 
 RNG = np.random.default_rng(1)
 

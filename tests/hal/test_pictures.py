@@ -7,7 +7,7 @@ import cv2
 import numpy as np
 import pytest
 
-from hal.pictures import MOST_SCANS, PNG_START, objection
+from lira.hal.messages.images import MOST_SCANS, PNG_START, objection
 
 
 def png(width, height, bits, kind):

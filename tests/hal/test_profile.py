@@ -3,9 +3,9 @@
 import msgspec
 import pytest
 
-from hal.config import parse_toml
-from hal.errors import ConfigError
-from hal.profile import NESTED, RobotProfile, known_profiles, load_profile
+from lira.hal.config import parse_toml
+from lira.hal.errors import ConfigError
+from lira.hal.profile import NESTED, RobotProfile, known_profiles, load_profile
 
 
 def load_with(table, **changes):

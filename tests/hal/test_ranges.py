@@ -5,11 +5,11 @@ import math
 import numpy as np
 import pytest
 
-from fusion.preprocess import bin_scan
-from hal.field import measure_clearance
-from hal.messages import LaserScan
-from hal.profile import load_profile
-from hal.ranges import read_ranges
+from lira.fusion.preprocess import bin_scan
+from lira.hal.messages import LaserScan
+from lira.hal.messages.ranges import read_ranges
+from lira.hal.profile import load_profile
+from lira.hal.safety.protective_field import measure_clearance
 
 PROFILE = load_profile("rosbot2")
 NAN, INF = math.nan, math.inf

@@ -10,13 +10,13 @@ from contextlib import contextmanager
 import pytest
 from wiring import new_endpoint, new_name, wait_for
 
-from hal.bus import Bus
-from hal.connection import Connection
-from hal.errors import BusError
-from hal.messages import STOP, Applied, Bool, Twist
-from hal.session import open_session
-from hal.topics import APPLIED, CMD_VEL, ESTOP, INFO
-from tools import relay
+from lira.hal.bus.bus import Bus
+from lira.hal.bus.connection import Connection
+from lira.hal.bus.topics import APPLIED, CMD_VEL, ESTOP, INFO
+from lira.hal.bus.zenoh_session import open_session
+from lira.hal.errors import BusError
+from lira.hal.messages import STOP, Applied, Bool, Twist
+from lira.tools.launch import link_fault as relay
 
 AWAY_S = 0.5  # less than a lease: the robot still holds the link that broke
 

@@ -7,11 +7,11 @@ from collections import deque
 import numpy as np
 import pytest
 
-from hal.attachment import Attachment
-from hal.bus import Received
-from hal.messages import HELD, STOP, Applied, Command, LaserScan, Reason, Source, Twist
-from hal.remote_realtime import SILENT_S, RealTimeLink
-from hal.topics import APPLIED, SCAN
+from lira.hal.bus.attachment import Attachment
+from lira.hal.bus.bus import Received
+from lira.hal.bus.topics import APPLIED, SCAN
+from lira.hal.client.realtime import SILENT_S, RealTimeLink
+from lira.hal.messages import HELD, STOP, Applied, Command, LaserScan, Reason, Source, Twist
 
 OLD, NEW = 1000.0, 3.0  # what the clocks say
 GO = Twist(0.5, 0.0)

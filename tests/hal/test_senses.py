@@ -4,10 +4,10 @@ from types import SimpleNamespace
 
 import pytest
 
-from hal.bus import Received
-from hal.messages import Odometry
-from hal.senses import Sense
-from hal.topics import ODOM
+from lira.hal.bus.bus import Received
+from lira.hal.bus.topics import ODOM
+from lira.hal.client.sensor_reader import Sense
+from lira.hal.messages import Odometry
 
 
 @pytest.mark.parametrize(("ahead_s", "until_s"), [(-0.1, 0.2), (0.0, 0.3), (0.09, 0.39), (0.15, None), (0.3, None)])

@@ -3,11 +3,11 @@
 import pytest
 from wiring import PROFILE, joined, remote, served, wait_for
 
-from hal.errors import BusError
-from hal.messages import STOP, Command, Episode, Reason, Source, Twist
-from hal.null import NullRobot
-from hal.remote import RemoteArena, RemoteRobot
-from hal.topics import APPLIED, CMD_VEL, LOCKSTEP
+from lira.hal.bus.topics import APPLIED, CMD_VEL, LOCKSTEP
+from lira.hal.client.remote import RemoteArena, RemoteRobot
+from lira.hal.errors import BusError
+from lira.hal.messages import STOP, Command, Episode, Reason, Source, Twist
+from lira.hal.testing import NullRobot
 
 GO, TURN = Twist(0.5, 0.0), Twist(0.0, 0.5)
 
@@ -117,7 +117,7 @@ def test_a_client_that_comes_back_goes_on_where_time_stands(robot):
 
 
 def test_a_robot_that_dies_is_said(robot, monkeypatch):
-    monkeypatch.setattr("hal.remote_lockstep.ANSWER_S", 0.3)
+    monkeypatch.setattr("lira.hal.client.lockstep.ANSWER_S", 0.3)
     with remote(robot) as client:
         robot.stop.set()
         robot.join()

@@ -10,17 +10,17 @@ import pytest
 import zenoh
 from wiring import PROFILE, StuckRobot, joined, new_endpoint, new_name, real_time_null, remote, served, wait_for
 
-from hal.bus import Bus, Publisher
-from hal.codec import encode
-from hal.errors import BusError, DeviceError
-from hal.governed import GovernedRobot
-from hal.messages import STOP, Applied, Command, DepthImage, Episode, Reason, Source, Twist
-from hal.null import NullRobot
-from hal.profile import STOP_BUDGET_S
-from hal.remote import RemoteArena, RemoteRobot
-from hal.remote_realtime import DECISION_S
-from hal.server import HalServer
-from hal.topics import APPLIED, CMD_VEL, DEPTH
+from lira.hal.bus.bus import Bus, Publisher
+from lira.hal.bus.topics import APPLIED, CMD_VEL, DEPTH
+from lira.hal.client.realtime import DECISION_S
+from lira.hal.client.remote import RemoteArena, RemoteRobot
+from lira.hal.errors import BusError, DeviceError
+from lira.hal.messages import STOP, Applied, Command, DepthImage, Episode, Reason, Source, Twist
+from lira.hal.messages.codec import encode
+from lira.hal.profile import STOP_BUDGET_S
+from lira.hal.safety.governed import GovernedRobot
+from lira.hal.server.server import HalServer
+from lira.hal.testing import NullRobot
 
 GO = Twist(0.5, 0.0)
 

@@ -4,11 +4,11 @@ import time
 
 from wiring import new_endpoint, real_time_null, served, wait_for
 
-from hal.bus import Bus
-from hal.messages import STOP, Command, Twist
-from hal.profile import STOP_BUDGET_S
-from hal.remote import RemoteRobot
-from tools.relay import Relay
+from lira.hal.bus.bus import Bus
+from lira.hal.client.remote import RemoteRobot
+from lira.hal.messages import STOP, Command, Twist
+from lira.hal.profile import STOP_BUDGET_S
+from lira.tools.launch.link_fault import Relay
 
 GO = Twist(0.5, 0.0)
 

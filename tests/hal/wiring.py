@@ -6,14 +6,14 @@ import uuid
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
-from hal.bus import Bus
-from hal.governed import GovernedRobot
-from hal.messages import Observation
-from hal.null import NullRobot
-from hal.profile import load_profile
-from hal.remote import RemoteRobot
-from hal.server import HalServer
-from tools.processes import free_port
+from lira.hal.bus.bus import Bus
+from lira.hal.client.remote import RemoteRobot
+from lira.hal.messages import Observation
+from lira.hal.profile import load_profile
+from lira.hal.safety.governed import GovernedRobot
+from lira.hal.server.server import HalServer
+from lira.hal.testing import NullRobot
+from lira.tools.launch.processes import free_port
 
 PROFILE = load_profile("thesis-sim")
 

@@ -4,6 +4,6 @@ import pytest
 @pytest.fixture(autouse=True)
 def no_long_waits(monkeypatch):
     """Devices are tried again, and resets waited for, without the patience that real ones need."""
-    monkeypatch.setattr("robot.keeper.RETRY_S", 0.2)
-    monkeypatch.setattr("robot.rplidar.device.RESET_S", 0.2)
-    monkeypatch.setattr("robot.rosbot.OPEN_S", 6.0)
+    monkeypatch.setattr("lira.robot.supervisor.RETRY_S", 0.2)
+    monkeypatch.setattr("lira.robot.rplidar.device.RESET_S", 0.2)
+    monkeypatch.setattr("lira.robot.rosbot.OPEN_S", 6.0)

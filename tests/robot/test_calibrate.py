@@ -11,18 +11,18 @@ from contextlib import contextmanager
 import numpy as np
 import pytest
 
-from hal.errors import ConfigError
-from hal.messages import STOP, LaserScan, Odometry
-from robot.calibration import turn_between, wall_ahead_m
-from robot.line import Line
-from robot.settings import BaseSettings, load_settings, set_key, write_base_setting
-from sim_backend.emulators.core2 import Core2Unit, Firmware
-from sim_backend.emulators.rplidar import RplidarUnit
-from sim_backend.emulators.wire import Wire
-from tools.calibration import CalibrationError, Way
-from tools.cli import EXIT_SIGNAL, main
-from tools.processes import ChildProcess, lira_command
-from tools.verbs import calibrate
+from lira.hal.errors import ConfigError
+from lira.hal.messages import STOP, LaserScan, Odometry
+from lira.robot.calibration import turn_between, wall_ahead_m
+from lira.robot.serial_port import Line
+from lira.robot.settings import BaseSettings, load_settings, set_key, write_base_setting
+from lira.sim_backend.emulators.core2 import Core2Unit, Firmware
+from lira.sim_backend.emulators.rplidar import RplidarUnit
+from lira.sim_backend.emulators.wire import Wire
+from lira.tools.calibration import CalibrationError, Way
+from lira.tools.cli import EXIT_SIGNAL, main
+from lira.tools.launch.processes import ChildProcess, lira_command
+from lira.tools.verbs import calibrate
 
 WALLS_M = (3.0, 1.7, -1.0, -1.3)  # ahead, left, behind, right of where it starts
 NO_FIELD = ["--profile", "thesis-sim"]  # whose robot may be driven without a lidar
@@ -160,7 +160,7 @@ def test_it_refuses_what_is_not_safe_and_writes_nothing(tmp_path, capsys, monkey
         assert "protective field is off" in refused([*words, "--yes"], capsys)
         room.held = True
         assert "wheels do not turn" in refused([*words, *lidar, "--only", "turn"], capsys)
-        monkeypatch.setattr("sim_backend.emulators.core2.VOLTAGE_V", 10.2)
+        monkeypatch.setattr("lira.sim_backend.emulators.core2.VOLTAGE_V", 10.2)
         assert "battery is at 10.2 V" in refused([*words, *lidar], capsys)
         with contextlib.closing(Line(words[3], 525000)):
             assert "in use" in refused([*words, *NO_FIELD, "--yes"], capsys)

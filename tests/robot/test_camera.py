@@ -11,15 +11,15 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from hal.errors import ConfigError, DeviceError, SensorError
-from hal.messages import CompressedImage, DepthImage, Image
-from hal.profile import load_profile
-from robot.camera.device import LIMIT_BYTES, CameraDevice, shrink
-from robot.camera.mjpeg import parse_parts
-from robot.camera.source import open_source
-from robot.camera.video import VideoSource
-from robot.keeper import Keeper
-from sim_backend.emulators.camera import MjpegServer
+from lira.hal.errors import ConfigError, DeviceError, SensorError
+from lira.hal.messages import CompressedImage, DepthImage, Image
+from lira.hal.profile import load_profile
+from lira.robot.camera.device import LIMIT_BYTES, CameraDevice, shrink
+from lira.robot.camera.mjpeg import parse_parts
+from lira.robot.camera.source import open_source
+from lira.robot.camera.video import VideoSource
+from lira.robot.supervisor import Keeper
+from lira.sim_backend.emulators.camera import MjpegServer
 
 CAMERA = load_profile("rosbot2").camera
 DEBIAN = sorted(Path("/usr/lib").glob("*/libOpenNI2.so.0"))
@@ -172,7 +172,7 @@ def test_a_picture_that_claims_too_much_is_lost_and_the_next_one_shown(size):
 
 
 def test_a_camera_whose_pictures_cannot_be_read_is_lost_and_says_why(monkeypatch):
-    monkeypatch.setattr("robot.camera.device.FIRST_S", 0.5)
+    monkeypatch.setattr("lira.robot.camera.device.FIRST_S", 0.5)
     server = MjpegServer()
     server.show(b"<html>no picture</html>")
     with Watch(server.url) as watch:
@@ -256,7 +256,7 @@ def part(body, head=b""):
     ids=["endless head", "long", "longest", "endless body", "boundaries", "noise"],
 )
 def test_an_odd_part_of_a_stream_is_passed_over(odd, monkeypatch):
-    monkeypatch.setattr("robot.camera.mjpeg.LARGEST_BYTES", 500_000)
+    monkeypatch.setattr("lira.robot.camera.mjpeg.LARGEST_BYTES", 500_000)
     with raw_stream(part(jpeg(1)), odd, part(jpeg(2)) * 2) as (url, asked), Watch(url) as watch:
         assert watch.wait(2).data == jpeg(2)
         assert len(asked) == 1
@@ -356,7 +356,7 @@ def test_openni_gives_depth_beside_the_pictures_and_it_can_be_opened_again(openn
 def test_a_camera_that_is_lost_is_opened_again_with_its_depth(openni, monkeypatch):
     with Watch("openni:Dummy", openni, depth=True) as watch:
         watch.wait(3)
-        monkeypatch.setattr("robot.camera.astra.openni2.wait_for_any_stream", lambda *_: None)  # it says no more
+        monkeypatch.setattr("lira.robot.camera.astra.openni2.wait_for_any_stream", lambda *_: None)  # it says no more
         until_s = time.monotonic() + 3.0
         while watch.keeper.alive:
             assert time.monotonic() < until_s
@@ -391,7 +391,7 @@ def test_video_is_read_picture_by_picture_red_first_and_its_end_is_a_loss_that_i
         opened.append(VideoSource(str(film), (64, 48)))
         return opened[-1]
 
-    monkeypatch.setattr("robot.camera.device.open_source", open_film)
+    monkeypatch.setattr("lira.robot.camera.device.open_source", open_film)
     with Watch("/dev/video0") as watch:
         watch.wait(25)
     assert len(opened) >= 2

@@ -5,14 +5,14 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from hal.errors import DeviceError
-from hal.messages import STOP, Odometry, Twist
-from robot.core2.device import Core2
-from robot.keeper import Keeper
-from robot.settings import BaseSettings
-from sim_backend.emulators.core2 import Core2Unit, Firmware
-from sim_backend.emulators.rosserial import encode, topic_info
-from sim_backend.emulators.wire import Wire
+from lira.hal.errors import DeviceError
+from lira.hal.messages import STOP, Odometry, Twist
+from lira.robot.core2.device import Core2
+from lira.robot.settings import BaseSettings
+from lira.robot.supervisor import Keeper
+from lira.sim_backend.emulators.core2 import Core2Unit, Firmware
+from lira.sim_backend.emulators.rosserial import encode, topic_info
+from lira.sim_backend.emulators.wire import Wire
 
 FAST = Firmware(boot_s=0.1)
 SETTINGS = BaseSettings(boot_s=0.15)
@@ -146,8 +146,8 @@ def test_motors_are_cut_and_given_back(tmp_path):
 
 
 def test_time_is_answered_so_that_the_board_stays(tmp_path, monkeypatch):
-    monkeypatch.setattr("sim_backend.emulators.core2.ASK_TIME_S", 0.1)
-    monkeypatch.setattr("sim_backend.emulators.core2.GIVE_UP_S", 0.5)
+    monkeypatch.setattr("lira.sim_backend.emulators.core2.ASK_TIME_S", 0.1)
+    monkeypatch.setattr("lira.sim_backend.emulators.core2.GIVE_UP_S", 0.5)
     with Bench(tmp_path / "base") as bench:
         time.sleep(1.0)
         assert bench.unit.configured
@@ -184,8 +184,8 @@ def test_no_farewell_goes_to_a_board_that_has_announced_nothing_since_it_was_los
 
 
 def test_what_is_at_the_line_when_it_is_opened_again_gets_requests_only(tmp_path, monkeypatch):
-    monkeypatch.setattr("robot.core2.device.FRAME_S", 0.1)
-    monkeypatch.setattr("robot.core2.device.BAUDS", (525000,))
+    monkeypatch.setattr("lira.robot.core2.device.FRAME_S", 0.1)
+    monkeypatch.setattr("lira.robot.core2.device.BAUDS", (525000,))
     with Bench(tmp_path / "base") as bench:
         bench.keep(Twist(0.2, 0.0), 0.2)
         bench.wire.unplug()

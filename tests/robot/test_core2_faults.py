@@ -4,13 +4,13 @@ import time
 
 import pytest
 
-from hal.governed import GovernedRobot
-from hal.messages import STOP, Command, Odometry, Twist
-from hal.profile import load_profile
-from robot.rosbot import Devices, Rosbot
-from robot.settings import BaseSettings, Settings
-from sim_backend.emulators.core2 import WATCHDOG_S, Core2Unit, Firmware
-from sim_backend.emulators.wire import Wire
+from lira.hal.messages import STOP, Command, Odometry, Twist
+from lira.hal.profile import load_profile
+from lira.hal.safety.governed import GovernedRobot
+from lira.robot.rosbot import Devices, Rosbot
+from lira.robot.settings import BaseSettings, Settings
+from lira.sim_backend.emulators.core2 import WATCHDOG_S, Core2Unit, Firmware
+from lira.sim_backend.emulators.wire import Wire
 
 GO = Twist(0.2, 0.0)
 RAMP_M_S2 = 1.5

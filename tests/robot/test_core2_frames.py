@@ -8,11 +8,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from hal.errors import SensorError
-from hal.messages import Odometry, Twist
-from robot.core2 import messages
-from robot.core2.board import Board
-from robot.core2.rosserial import (
+from lira.hal.errors import SensorError
+from lira.hal.messages import Odometry, Twist
+from lira.robot.core2 import messages
+from lira.robot.core2.board import Board
+from lira.robot.core2.rosserial import (
     ASK_TOPICS,
     Frame,
     Id,
@@ -23,10 +23,10 @@ from robot.core2.rosserial import (
     parse_frames,
     parse_topic_info,
 )
-from robot.core2.wheels import Pose, Reckoner
-from robot.settings import BaseSettings
-from sim_backend.emulators import core2 as emulated
-from sim_backend.emulators import rosserial as emulator
+from lira.robot.core2.wheels import Pose, Reckoner
+from lira.robot.settings import BaseSettings
+from lira.sim_backend.emulators import core2 as emulated
+from lira.sim_backend.emulators import rosserial as emulator
 
 FRAMES = [Frame(topic, bytes([topic % 256] * size)) for topic, size in [(100, 0), (125, 48), (10, 8), (127, 320)] * 5]
 STREAM = b"".join(encode_frame(frame.topic, frame.payload) for frame in FRAMES)

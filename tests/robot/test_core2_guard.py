@@ -7,23 +7,23 @@ import time
 
 import pytest
 
-from hal.errors import DeviceError
-from hal.messages import STOP, Odometry, Twist
-from robot.core2.device import Core2
-from robot.core2.guard import Guard
-from robot.keeper import Keeper
-from robot.settings import BaseSettings
-from sim_backend.emulators.core2 import WATCHDOG_S, Core2Unit, Firmware
-from sim_backend.emulators.wire import Wire
+from lira.hal.errors import DeviceError
+from lira.hal.messages import STOP, Odometry, Twist
+from lira.robot.core2.device import Core2
+from lira.robot.core2.watchdog import Guard
+from lira.robot.settings import BaseSettings
+from lira.robot.supervisor import Keeper
+from lira.sim_backend.emulators.core2 import WATCHDOG_S, Core2Unit, Firmware
+from lira.sim_backend.emulators.wire import Wire
 
 GO = Twist(0.2, 0.0)
 SOON_S = 0.35
 DRIVER = """
 import sys, time
-from hal.messages import Twist
-from robot.core2.device import Core2
-from robot.keeper import Keeper
-from robot.settings import BaseSettings
+from lira.hal.messages import Twist
+from lira.robot.core2.device import Core2
+from lira.robot.supervisor import Keeper
+from lira.robot.settings import BaseSettings
 base = Core2(sys.argv[1], BaseSettings(boot_s=0.15), 0.3)
 keeper = Keeper("base", base.session)
 keeper.start()
@@ -114,7 +114,7 @@ def is_alive(pid):
 
 def test_who_was_thawed_counts_a_loss_and_stands_for_a_moment(board, tmp_path, monkeypatch):
     for page in ("contact", "device"):  # on a busy machine the emulated board is silent now and then
-        monkeypatch.setattr(f"robot.core2.{page}.SILENCE_S", 5.0)
+        monkeypatch.setattr(f"lira.robot.core2.{page}.SILENCE_S", 5.0)
     base = Core2(str(tmp_path / "core2"), BaseSettings(boot_s=0.15), 5.0)
     keeper = Keeper("base", base.session)
     keeper.start()

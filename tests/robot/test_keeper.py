@@ -5,9 +5,9 @@ from itertools import pairwise
 
 import pytest
 
-from hal.errors import ConfigError, DeviceError
-from robot import keeper as page
-from robot.keeper import Keeper
+from lira.hal.errors import ConfigError, DeviceError
+from lira.robot import supervisor as page
+from lira.robot.supervisor import Keeper
 
 
 @pytest.fixture

@@ -5,17 +5,17 @@ from contextlib import contextmanager
 
 import pytest
 
-from hal.errors import DeviceError
-from hal.messages import STOP, Odometry
-from hal.profile import load_profile
-from robot.core2.device import Core2
-from robot.keeper import Keeper
-from robot.line import Line
-from robot.rplidar.device import RPLidar
-from robot.settings import BaseSettings, LidarSettings
-from sim_backend.emulators.core2 import Core2Unit, Firmware
-from sim_backend.emulators.rplidar import RplidarUnit
-from sim_backend.emulators.wire import Wire
+from lira.hal.errors import DeviceError
+from lira.hal.messages import STOP, Odometry
+from lira.hal.profile import load_profile
+from lira.robot.core2.device import Core2
+from lira.robot.rplidar.device import RPLidar
+from lira.robot.serial_port import Line
+from lira.robot.settings import BaseSettings, LidarSettings
+from lira.robot.supervisor import Keeper
+from lira.sim_backend.emulators.core2 import Core2Unit, Firmware
+from lira.sim_backend.emulators.rplidar import RplidarUnit
+from lira.sim_backend.emulators.wire import Wire
 
 
 @contextmanager

@@ -7,15 +7,15 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from hal.bus import Received
-from hal.errors import DeviceError
-from hal.governed import FIELD_OFF, GovernedRobot
-from hal.messages import STOP, Command, CompressedImage, LaserScan, Odometry, Reason, Twist
-from hal.profile import load_profile
-from robot.core2.board import Readings
-from robot.keeper import Keeper
-from robot.ros2.robot import Interface, Ros2Robot
-from robot.rosbot import BLIND_S, Devices, Rosbot
+from lira.hal.bus.bus import Received
+from lira.hal.errors import DeviceError
+from lira.hal.messages import STOP, Command, CompressedImage, LaserScan, Odometry, Reason, Twist
+from lira.hal.profile import load_profile
+from lira.hal.safety.governed import FIELD_OFF, GovernedRobot
+from lira.robot.core2.board import Readings
+from lira.robot.ros2.robot import Interface, Ros2Robot
+from lira.robot.rosbot import BLIND_S, Devices, Rosbot
+from lira.robot.supervisor import Keeper
 
 PROFILE = load_profile("rosbot2")
 GO = Twist(0.2, 0.0)
@@ -194,7 +194,7 @@ class Far:
 
     def __init__(self, monkeypatch):
         self.local_s = 50.0
-        monkeypatch.setattr("robot.ros2.robot.time", SimpleNamespace(monotonic=lambda: self.local_s))
+        monkeypatch.setattr("lira.robot.ros2.robot.time", SimpleNamespace(monotonic=lambda: self.local_s))
         self.bus = FarBus()
         self.robot = Ros2Robot(PROFILE, self.bus, Interface())
         self.show()

@@ -4,20 +4,20 @@ import threading
 import time
 from contextlib import contextmanager
 
-from hal.bus import Bus
-from hal.estop import press_estop, release_estop
-from hal.governed import GovernedRobot
-from hal.messages import STOP, Bool, Command, Odometry, Reason, Twist
-from hal.profile import load_profile
-from hal.remote import RemoteRobot
-from hal.server import HalServer
-from hal.topics import ESTOP
-from robot.core2.errands import AGAIN_S, Errands
-from robot.rosbot import Devices, Rosbot
-from robot.settings import BaseSettings, Settings
-from sim_backend.emulators.core2 import Core2Unit, Firmware
-from sim_backend.emulators.wire import Wire
-from tools.processes import free_port
+from lira.hal.bus.bus import Bus
+from lira.hal.bus.topics import ESTOP
+from lira.hal.client.remote import RemoteRobot
+from lira.hal.messages import STOP, Bool, Command, Odometry, Reason, Twist
+from lira.hal.profile import load_profile
+from lira.hal.safety.governed import GovernedRobot
+from lira.hal.server.estop_service import press_estop, release_estop
+from lira.hal.server.server import HalServer
+from lira.robot.core2.config_calls import AGAIN_S, Errands
+from lira.robot.rosbot import Devices, Rosbot
+from lira.robot.settings import BaseSettings, Settings
+from lira.sim_backend.emulators.core2 import Core2Unit, Firmware
+from lira.sim_backend.emulators.wire import Wire
+from lira.tools.launch.processes import free_port
 
 PROFILE = load_profile("thesis-sim")
 SETTINGS = Settings(base=BaseSettings(boot_s=0.1))

@@ -3,20 +3,20 @@ import subprocess
 import sys
 import time
 
-from hal.bus import Bus
-from hal.messages import STOP, Command, Reason, Twist
-from hal.profile import load_profile
-from hal.remote import RemoteRobot
-from sim_backend.emulators.bench import WiredTwin
-from sim_backend.emulators.core2 import Firmware
-from sim_backend.twin import Twin
-from tools.processes import ChildProcess, free_port, lira_command
+from lira.hal.bus.bus import Bus
+from lira.hal.client.remote import RemoteRobot
+from lira.hal.messages import STOP, Command, Reason, Twist
+from lira.hal.profile import load_profile
+from lira.sim_backend.emulators.core2 import Firmware
+from lira.sim_backend.emulators.wired_twin import WiredTwin
+from lira.sim_backend.twin import Twin
+from lira.tools.launch.processes import ChildProcess, free_port, lira_command
 
 
 def lira(*words, block=()):
     """Run `lira` in a process of its own; importing a package in `block` fails as if it were not installed."""
     code = f"import sys; sys.modules.update(dict.fromkeys({list(block)!r}))\n"
-    code += f"from tools.cli import main; sys.exit(main({list(words)!r}))"
+    code += f"from lira.tools.cli import main; sys.exit(main({list(words)!r}))"
     return subprocess.run([sys.executable, "-c", code], check=False, capture_output=True, text=True, timeout=60)
 
 
@@ -63,7 +63,7 @@ def test_the_twin_behind_its_devices_is_driven_over_the_bus(tmp_path):
         line = twin.wait_ready("open them with: lira robot", 60.0)
         words = re.search(r"lira robot (.*)", line)[1].split()
         command = lira_command("robot", *words, "--name", name, "--listen", endpoint)
-        with ChildProcess("the robot", command, tmp_path / "robot.log") as server:
+        with ChildProcess("the robot", command, tmp_path / "lira.robot.log") as server:
             server.wait_ready("serves", 60.0)
             bus = Bus(name, connect=endpoint)
             robot = RemoteRobot(bus)
@@ -96,7 +96,7 @@ def test_the_lidars_plug_pulled_mid_drive_stops_it_within_half_a_second_and_it_r
     words += ["--settings", str(tmp_path / "quick.toml"), "--profile", "thesis-sim"]
     command = lira_command("robot", *words, "--name", name, "--listen", endpoint)
     try:
-        with ChildProcess("the robot", command, tmp_path / "robot.log") as server:
+        with ChildProcess("the robot", command, tmp_path / "lira.robot.log") as server:
             server.wait_ready("serves", 60.0)
             bus = Bus(name, connect=endpoint)
             robot = RemoteRobot(bus)

@@ -12,18 +12,18 @@ from mcap.records import Schema
 from mcap_ros2.decoder import DecoderFactory
 from ros2_peer import ATTACHMENTS, Peer, twist_cdr
 
-from hal.bus import Bus
-from hal.errors import BusError, ConfigError, DeviceError
-from hal.governed import GovernedRobot
-from hal.messages import STOP, Command, CompressedImage, LaserScan, Reason, Twist
-from hal.profile import load_profile
-from hal.remote import RemoteRobot
-from hal.ros import definition
-from hal.server import HalServer
-from robot.ros2.forms import placed_scan, plain_picture
-from robot.ros2.robot import Interface, Ros2Robot
-from tools.cli import main
-from tools.processes import ChildProcess, free_port, lira_command
+from lira.hal.bus.bus import Bus
+from lira.hal.client.remote import RemoteRobot
+from lira.hal.errors import BusError, ConfigError, DeviceError
+from lira.hal.messages import STOP, Command, CompressedImage, LaserScan, Reason, Twist
+from lira.hal.messages.ros_table import definition
+from lira.hal.profile import load_profile
+from lira.hal.safety.governed import GovernedRobot
+from lira.hal.server.server import HalServer
+from lira.robot.ros2.forms import placed_scan, plain_picture
+from lira.robot.ros2.robot import Interface, Ros2Robot
+from lira.tools.cli import main
+from lira.tools.launch.processes import ChildProcess, free_port, lira_command
 
 PROFILE = load_profile("thesis-sim")
 GO = Twist(0.3, 0.5)
@@ -146,7 +146,7 @@ def test_other_names_are_used_and_mistaken_ones_refused(capsys):
 
 
 def test_a_robot_that_does_not_show_what_is_needed_is_refused_with_the_topic(monkeypatch):
-    monkeypatch.setattr("robot.ros2.robot.OPEN_S", 1.0)
+    monkeypatch.setattr("lira.robot.ros2.robot.OPEN_S", 1.0)
     port = free_port()
     robot = Peer(port)
     robot.silent.add("scan")
@@ -161,7 +161,7 @@ def test_a_robot_that_does_not_show_what_is_needed_is_refused_with_the_topic(mon
 
 
 def test_where_no_bridge_is_that_is_said(monkeypatch):
-    monkeypatch.setattr("robot.ros2.robot.OPEN_S", 0.3)
+    monkeypatch.setattr("lira.robot.ros2.robot.OPEN_S", 0.3)
     bus = Bus("lonely", connect=f"127.0.0.1:{free_port()}", prefix="")
     with pytest.raises(BusError, match="no bridge answers"):
         Ros2Robot(PROFILE, bus, Interface()).open()
@@ -186,7 +186,7 @@ def test_the_verb_serves_it_for_lira_fusion_and_says_what_is_missing(tmp_path, d
                 server.wait_ready("a Twist carries no time", 10.0)
                 server.wait_ready("one link to the bridge", 10.0)
             policy = ["fusion", "--policy", "lidar-expert", "--name", name, "--connect", near]
-            with ChildProcess("the policy", lira_command(*policy), tmp_path / "fusion.log") as fusion:
+            with ChildProcess("the policy", lira_command(*policy), tmp_path / "lira.fusion.log") as fusion:
                 fusion.wait_ready("drives", 60.0)
                 wait_for(lambda: not robot.commands[-1][1].endswith(ZERO), 20.0)
             wait_for(lambda: robot.commands[-1][1].endswith(ZERO), 2.0)

@@ -4,16 +4,16 @@ from contextlib import contextmanager
 
 import pytest
 
-from hal.errors import ConfigError, DeviceError
-from hal.governed import GovernedRobot
-from hal.messages import STOP, Command, Reason, Twist
-from hal.profile import load_profile
-from robot.rosbot import Devices, Rosbot
-from robot.settings import BaseSettings, LidarSettings, Settings, load_settings
-from sim_backend.emulators.bench import WiredTwin
-from sim_backend.emulators.camera import MjpegServer
-from sim_backend.emulators.core2 import Firmware
-from sim_backend.twin import Twin
+from lira.hal.errors import ConfigError, DeviceError
+from lira.hal.messages import STOP, Command, Reason, Twist
+from lira.hal.profile import load_profile
+from lira.hal.safety.governed import GovernedRobot
+from lira.robot.rosbot import Devices, Rosbot
+from lira.robot.settings import BaseSettings, LidarSettings, Settings, load_settings
+from lira.sim_backend.emulators.camera import MjpegServer
+from lira.sim_backend.emulators.core2 import Firmware
+from lira.sim_backend.emulators.wired_twin import WiredTwin
+from lira.sim_backend.twin import Twin
 
 PROFILE = load_profile("thesis-sim")
 QUICK = Settings(lidar=LidarSettings(spin_up_s=0.0), base=BaseSettings(boot_s=0.1))

@@ -11,14 +11,22 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from hal.errors import DeviceError
-from hal.profile import load_profile
-from robot.keeper import Keeper
-from robot.rplidar import protocol
-from robot.rplidar.device import RPLidar
-from robot.settings import LidarSettings
-from sim_backend.emulators.rplidar import DENSE_MODE, EXPRESS_MODE, STANDARD_MODE, Model, RplidarUnit, descriptor, seal
-from sim_backend.emulators.wire import Wire
+from lira.hal.errors import DeviceError
+from lira.hal.profile import load_profile
+from lira.robot.rplidar import protocol
+from lira.robot.rplidar.device import RPLidar
+from lira.robot.settings import LidarSettings
+from lira.robot.supervisor import Keeper
+from lira.sim_backend.emulators.rplidar import (
+    DENSE_MODE,
+    EXPRESS_MODE,
+    STANDARD_MODE,
+    Model,
+    RplidarUnit,
+    descriptor,
+    seal,
+)
+from lira.sim_backend.emulators.wire import Wire
 
 LIDAR = load_profile("rosbot2").lidar
 SETTINGS = LidarSettings(spin_up_s=0.0)
@@ -204,10 +212,10 @@ def test_what_is_missing_or_no_lidar_is_named(tmp_path):
 
 SCAN_FOR_EVER = """
 import sys, threading
-from hal.profile import load_profile
-from hal.server import stop_on_signal
-from robot.rplidar.device import RPLidar
-from robot.settings import LidarSettings
+from lira.hal.profile import load_profile
+from lira.hal.server.server import stop_on_signal
+from lira.robot.rplidar.device import RPLidar
+from lira.robot.settings import LidarSettings
 with stop_on_signal() as stop:
     driver = RPLidar(sys.argv[1], load_profile("rosbot2").lidar, LidarSettings(spin_up_s=0.0), lambda scan: None)
     driver.session(stop, lambda: print("scans", flush=True))

@@ -6,10 +6,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from robot.rplidar import protocol
-from robot.rplidar.points import Points, parse_dense, parse_express, parse_standard
-from robot.rplidar.protocol import Answer
-from sim_backend.emulators.rplidar import encode_dense, encode_express, encode_nodes, seal
+from lira.robot.rplidar import protocol
+from lira.robot.rplidar.points import Points, parse_dense, parse_express, parse_standard
+from lira.robot.rplidar.protocol import Answer
+from lira.sim_backend.emulators.rplidar import encode_dense, encode_express, encode_nodes, seal
 
 STEP_RAD = math.radians(0.9)
 

@@ -6,11 +6,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from hal.profile import load_profile
-from robot.rplidar.device import Counts, Stream
-from robot.rplidar.points import parse_dense
-from robot.rplidar.turn import Mounting, Turn, TurnCutter, scan_of
-from sim_backend.emulators.rplidar import encode_dense
+from lira.hal.profile import load_profile
+from lira.robot.rplidar.device import Counts, Stream
+from lira.robot.rplidar.points import parse_dense
+from lira.robot.rplidar.turn import Mounting, Turn, TurnCutter, scan_of
+from lira.sim_backend.emulators.rplidar import encode_dense
 
 LIDAR = load_profile("rosbot2").lidar
 POINTS = 400

@@ -1,8 +1,8 @@
 import pytest
 
-from hal.profile import load_profile
-from sim_backend.twin import Twin
-from tools.bench import twin as bench
+from lira.hal.profile import load_profile
+from lira.sim_backend.twin import Twin
+from lira.tools.bench import twin as bench
 
 
 def test_a_row_has_what_the_table_needs(monkeypatch):

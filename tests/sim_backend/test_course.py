@@ -3,10 +3,10 @@ import math
 import numpy as np
 import pytest
 
-from hal.profile import load_profile
-from sim_backend.catalogue import load_world
-from sim_backend.course import Course, Obstacles, footprint_radius_m
-from sim_backend.layout import Block, build
+from lira.hal.profile import load_profile
+from lira.sim_backend.catalogue import load_world
+from lira.sim_backend.course import Course, Obstacles, footprint_radius_m
+from lira.sim_backend.layout import Block, build
 
 
 @pytest.fixture(scope="module")

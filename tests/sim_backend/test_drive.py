@@ -4,13 +4,13 @@ import msgspec
 import numpy as np
 import pytest
 
-from hal.messages import Twist
-from hal.profile import load_profile
-from sim_backend import drive
-from sim_backend.body import Body
-from sim_backend.catalogue import load_world
-from sim_backend.course import Course
-from sim_backend.layout import build
+from lira.hal.messages import Twist
+from lira.hal.profile import load_profile
+from lira.sim_backend import drive
+from lira.sim_backend.body import Body
+from lira.sim_backend.catalogue import load_world
+from lira.sim_backend.course import Course
+from lira.sim_backend.layout import build
 
 KINEMATIC = load_profile("thesis-sim").base
 WHEELS = load_profile("rosbot2").base

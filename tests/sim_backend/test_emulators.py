@@ -5,12 +5,12 @@ import time
 import numpy as np
 import pytest
 
-from hal.errors import DeviceError
-from hal.messages import STOP, Odometry, Twist
-from sim_backend.emulators.core2 import Core2Unit, Firmware
-from sim_backend.emulators.rosserial import Reader, unpack_string
-from sim_backend.emulators.rplidar import EXPRESS_MODE, Model, RplidarUnit
-from sim_backend.emulators.wire import Wire
+from lira.hal.errors import DeviceError
+from lira.hal.messages import STOP, Odometry, Twist
+from lira.sim_backend.emulators.core2 import Core2Unit, Firmware
+from lira.sim_backend.emulators.rosserial import Reader, unpack_string
+from lira.sim_backend.emulators.rplidar import EXPRESS_MODE, Model, RplidarUnit
+from lira.sim_backend.emulators.wire import Wire
 
 ASK = bytes.fromhex("fffe0000ff0000ff")
 TWIST = bytes.fromhex("fffe3000cf6500" + struct.pack("<6d", 0.2, 0, 0, 0, 0, 0.5).hex() + "dc")

@@ -6,15 +6,15 @@ import msgspec
 import numpy as np
 import pytest
 
-from fusion.preprocess import bin_scan, gray_image, to_uint8
-from hal.messages import Command, Twist
-from hal.profile import load_profile
-from sim_backend import drive
-from sim_backend.catalogue import load_world
-from sim_backend.layout import build
-from sim_backend.sensors import Sensors
-from sim_backend.twin import Twin
-from sim_backend.world import Box, Limits, Line, Patch, Piece, Start, World
+from lira.fusion.preprocess import bin_scan, gray_image, to_uint8
+from lira.hal.messages import Command, Twist
+from lira.hal.profile import load_profile
+from lira.sim_backend import drive
+from lira.sim_backend.catalogue import load_world
+from lira.sim_backend.layout import build
+from lira.sim_backend.sensors import Sensors
+from lira.sim_backend.twin import Twin
+from lira.sim_backend.world import Box, Limits, Line, Patch, Piece, Start, World
 
 SIM = load_profile("thesis-sim")
 ROSBOT = load_profile("rosbot2")

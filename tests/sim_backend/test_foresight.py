@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 
-from fusion.preprocess import gray_image
-from hal.messages import Episode
-from hal.profile import load_profile
-from sim_backend.foresight import sketching
-from sim_backend.twin import Twin
+from lira.fusion.preprocess import gray_image
+from lira.hal.messages import Episode
+from lira.hal.profile import load_profile
+from lira.sim_backend.foresight import sketching
+from lira.sim_backend.twin import Twin
 
 
 @pytest.mark.parametrize("world", ["corridor", "garden"])

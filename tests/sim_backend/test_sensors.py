@@ -5,16 +5,16 @@ import msgspec
 import numpy as np
 import pytest
 
-from hal.errors import ConfigError
-from hal.messages import CompressedImage
-from hal.profile import load_profile
-from sim_backend import drive
-from sim_backend.camera import encode_jpeg, projection_matrix, view_matrix
-from sim_backend.layout import build
-from sim_backend.lidar import beam_angles
-from sim_backend.scene import Scene
-from sim_backend.sensors import Sensors
-from sim_backend.world import Along, Box, Limits, Line, Piece, World
+from lira.hal.errors import ConfigError
+from lira.hal.messages import CompressedImage
+from lira.hal.profile import load_profile
+from lira.sim_backend import drive
+from lira.sim_backend.camera import encode_jpeg, projection_matrix, view_matrix
+from lira.sim_backend.layout import build
+from lira.sim_backend.lidar import beam_angles
+from lira.sim_backend.scene import Scene
+from lira.sim_backend.sensors import Sensors
+from lira.sim_backend.world import Along, Box, Limits, Line, Piece, World
 
 SIM = load_profile("thesis-sim")
 ROSBOT = load_profile("rosbot2")

@@ -8,12 +8,12 @@ from concurrent.futures import ThreadPoolExecutor
 import numpy as np
 import pytest
 
-from hal.errors import ConfigError, DeviceError, MissingExtraError
-from hal.messages import Command, CompressedImage, Episode, Image, Reason, Source, Twist
-from hal.profile import load_profile
-from sim_backend import scene
-from sim_backend.foresight import Foresight
-from sim_backend.twin import Twin
+from lira.hal.errors import ConfigError, DeviceError, MissingExtraError
+from lira.hal.messages import Command, CompressedImage, Episode, Image, Reason, Source, Twist
+from lira.hal.profile import load_profile
+from lira.sim_backend import scene
+from lira.sim_backend.foresight import Foresight
+from lira.sim_backend.twin import Twin
 
 SIM = load_profile("thesis-sim")
 ROSBOT = load_profile("rosbot2")
@@ -286,7 +286,7 @@ def test_without_pybullet_the_remedy_is_named(monkeypatch):
 
 def test_nothing_but_reports_reaches_the_standard_output():
     code = (
-        "from hal.profile import load_profile; from sim_backend.twin import Twin\n"
+        "from lira.hal.profile import load_profile; from lira.sim_backend.twin import Twin\n"
         "t = Twin(load_profile('rosbot2'), 'line'); t.open(); t.read(); t.close(); print('report')"
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=60, check=True)

@@ -7,11 +7,10 @@ import msgspec
 import numpy as np
 import pytest
 
-import sim_backend
-from hal.errors import ConfigError
-from sim_backend.catalogue import known_worlds, load_world
-from sim_backend.course import Course
-from sim_backend.layout import Mark, build, distance_m
+from lira.hal.errors import ConfigError
+from lira.sim_backend.catalogue import known_worlds, load_world
+from lira.sim_backend.course import Course
+from lira.sim_backend.layout import Mark, build, distance_m
 
 OVAL = """
 description = "an oval"

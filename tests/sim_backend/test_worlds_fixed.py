@@ -4,11 +4,11 @@ import hashlib
 
 import numpy as np
 
-from hal.profile import load_profile
-from sim_backend import drive
-from sim_backend.catalogue import load_world
-from sim_backend.layout import build
-from sim_backend.sensors import Sensors
+from lira.hal.profile import load_profile
+from lira.sim_backend import drive
+from lira.sim_backend.catalogue import load_world
+from lira.sim_backend.layout import build
+from lira.sim_backend.sensors import Sensors
 
 LAYOUT_HASH = "2e1c2e139533b7d3"
 PICTURE_HASH = "d37148c6458a47b1"

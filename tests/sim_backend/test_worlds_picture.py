@@ -5,12 +5,12 @@ import msgspec
 import numpy as np
 import pytest
 
-from hal.profile import load_profile
-from sim_backend.catalogue import known_worlds, load_world
-from sim_backend.course import Course
-from sim_backend.layout import build
-from tools.cli import main
-from tools.world_picture import FREE_M, LETTERS, OUTLINE, WIDE_PX, draw, from_above, view_poses
+from lira.hal.profile import load_profile
+from lira.sim_backend.catalogue import known_worlds, load_world
+from lira.sim_backend.course import Course
+from lira.sim_backend.layout import build
+from lira.tools.cli import main
+from lira.tools.output.world_picture import FREE_M, LETTERS, OUTLINE, WIDE_PX, draw, from_above, view_poses
 
 PICTURES = Path(__file__).parents[2] / "sim_backend" / "pictures"
 

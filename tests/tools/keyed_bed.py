@@ -7,15 +7,15 @@ from contextlib import contextmanager
 
 import zenoh
 
-from hal.bus import Bus
-from hal.governed import GovernedRobot
-from hal.keys import Role, load_keys
-from hal.messages import Command, Twist
-from hal.null import NullRobot
-from hal.profile import load_profile
-from hal.server import HalServer
-from tools.authority import enroll, init
-from tools.processes import free_port
+from lira.hal.bus.bus import Bus
+from lira.hal.bus.keys import Role, load_keys
+from lira.hal.messages import Command, Twist
+from lira.hal.profile import load_profile
+from lira.hal.safety.governed import GovernedRobot
+from lira.hal.server.server import HalServer
+from lira.hal.testing import NullRobot
+from lira.tools.authority import enroll, init
+from lira.tools.launch.processes import free_port
 
 GO = Twist(0.5, 0.0)
 NAME = "keyed"

@@ -1,11 +1,11 @@
 """Outcomes with numbers chosen by hand, to check what is computed from them."""
 
-from fusion.ledger import Account
-from fusion.presets import METHODS
-from fusion.record import LapRecord, ResultRecord
-from tools.experiments.methods import LIRA
-from tools.experiments.notes import Track
-from tools.experiments.trial import Outcome, Trial
+from lira.fusion.log.counts import Account
+from lira.fusion.log.run_log import LapRecord, ResultRecord
+from lira.fusion.methods.presets import METHODS
+from lira.tools.experiments.methods import LIRA
+from lira.tools.experiments.notes import Track
+from lira.tools.experiments.trial import Outcome, Trial
 
 HOLD = LIRA[0].name
 

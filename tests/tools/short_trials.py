@@ -2,10 +2,10 @@
 
 import msgspec
 
-from fusion.hg_dagger import HgDaggerSettings
-from fusion.lira import PRESETS
-from fusion.teacher import PERFECT
-from tools.experiments.trial import Method, Trial
+from lira.fusion.methods.hg_dagger import HgDaggerSettings
+from lira.fusion.methods.lira import PRESETS
+from lira.fusion.teaching.teacher import PERFECT
+from lira.tools.experiments.trial import Method, Trial
 
 SHORT = """
 description = "Ten metres of line with one box on it"

@@ -5,10 +5,10 @@ from pathlib import Path
 
 import numpy as np
 
-from fusion.record import LapRecord, Pose, ResultRecord, RunRecord, RunWriter, StepRecord
-from hal.messages import Decision, ExpertView, LabelCounts
-from sim_backend.catalogue import load_world
-from sim_backend.layout import build
+from lira.fusion.log.run_log import LapRecord, Pose, ResultRecord, RunRecord, RunWriter, StepRecord
+from lira.hal.messages import Decision, ExpertView, LabelCounts
+from lira.sim_backend.catalogue import load_world
+from lira.sim_backend.layout import build
 
 PERIOD_S = 0.2
 NEAR_M = 1.2

@@ -7,24 +7,17 @@ import zenoh
 from keyed_bed import GO, NAME, attacker, drive_until, make_keys, plain_session, replies, serving, tls
 from zenoh import ext
 
-from hal.attachment import Attachment, parse_attachment
-from hal.bus import Bus
-from hal.codec import encode
-from hal.desk import info_from_json
-from hal.errors import BusError, ConfigError
-from hal.estop import look_at_estop, press_estop, release_estop
-from hal.keys import load_keys
-from hal.messages import STOP, BatteryState, Command, Reason, Twist
-from hal.remote import RemoteRobot
-from hal.topics import (
-    BATTERY,
-    ESTOP_LOOK,
-    ESTOP_PRESS,
-    ESTOP_RELEASE,
-    INFO,
-    RESET,
-)
-from tools.processes import free_port
+from lira.hal.bus.attachment import Attachment, parse_attachment
+from lira.hal.bus.bus import Bus
+from lira.hal.bus.keys import load_keys
+from lira.hal.bus.topics import BATTERY, ESTOP_LOOK, ESTOP_PRESS, ESTOP_RELEASE, INFO, RESET
+from lira.hal.client.remote import RemoteRobot
+from lira.hal.errors import BusError, ConfigError
+from lira.hal.messages import STOP, BatteryState, Command, Reason, Twist
+from lira.hal.messages.codec import encode
+from lira.hal.server.estop_service import look_at_estop, press_estop, release_estop
+from lira.hal.server.info_service import info_from_json
+from lira.tools.launch.processes import free_port
 
 
 @pytest.fixture(scope="module")

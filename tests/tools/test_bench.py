@@ -4,18 +4,18 @@ import sys
 
 import pytest
 
-from tools import bench, cli
+from lira.tools import bench, cli
 
 FAKE = """
 import os, sys, types
-module = types.ModuleType("tools.bench.twin")
+module = types.ModuleType("lira.tools.bench.twin")
 def run():
     print("chatter from Python")
     os.write(1, b"chatter from C\\n")
     return [{"profile": "thesis-sim", "real_time_factor": 61.23456}, {"profile": "rosbot2", "renderer": "egl"}]
 module.run = run
-sys.modules["tools.bench.twin"] = module
-from tools.cli import main
+sys.modules["lira.tools.bench.twin"] = module
+from lira.tools.cli import main
 sys.exit(main(sys.argv[1:]))
 """
 

@@ -3,7 +3,7 @@
 import pytest
 import torch
 
-from tools.bench import latency, lockstep
+from lira.tools.bench import latency, lockstep
 
 
 @pytest.fixture(autouse=True)

@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 from short_trials import write_world
 
-from fusion.control import ControlLoop
-from fusion.preprocess import gray_image
-from hal.messages import CompressedImage
-from tools.bench import log, preprocess, step, train
+from lira.fusion.control import ControlLoop
+from lira.fusion.preprocess import gray_image
+from lira.hal.messages import CompressedImage
+from lira.tools.bench import log, preprocess, step, train
 
 
 def test_preprocess_compares_two_ways_to_the_same_image(monkeypatch):

@@ -5,9 +5,9 @@ import time
 
 import pytest
 
-from sim_backend.catalogue import load_world
-from tools.cli import main
-from tools.joystick.memory import PadMemory
+from lira.sim_backend.catalogue import load_world
+from lira.tools.cli import main
+from lira.tools.joystick.known_pads import PadMemory
 
 AT_ONCE_S = 5.0
 
@@ -73,7 +73,7 @@ def test_a_world_that_nobody_could_lay_out_is_refused(tmp_path, capsys, text, wh
 
 @pytest.mark.parametrize("progress_m", [1e308, -1e308, float("nan"), float("inf")])
 def test_there_is_no_place_beyond_all_floors(progress_m):
-    from sim_backend.layout import build
+    from lira.sim_backend.layout import build
 
     with pytest.raises(ValueError, match="no floor"):
         build(load_world("line")).curve.pose(progress_m)

@@ -4,8 +4,8 @@ from types import SimpleNamespace
 
 import pytest
 
-from hal.errors import ConfigError
-from tools import cli
+from lira.hal.errors import ConfigError
+from lira.tools import cli
 
 
 def lira(*words, block=()):
@@ -13,7 +13,7 @@ def lira(*words, block=()):
     code = (
         "import sys\n"
         f"sys.modules.update(dict.fromkeys({list(block)!r}))\n"
-        f"from tools.cli import main; sys.exit(main({list(words)!r}))"
+        f"from lira.tools.cli import main; sys.exit(main({list(words)!r}))"
     )
     return subprocess.run(
         [sys.executable, "-c", code],
@@ -105,7 +105,7 @@ def test_a_missing_package_names_its_extra(verb, capsys, package, extra):
 
 def test_a_module_of_ours_that_is_missing_is_a_bug_and_shows(verb):
     def run(args):
-        raise ModuleNotFoundError("No module named 'hal.nothing'", name="hal.nothing")
+        raise ModuleNotFoundError("No module named 'lira.hal.nothing'", name="lira.hal.nothing")
 
     verb(run)
     with pytest.raises(ModuleNotFoundError):
@@ -115,7 +115,7 @@ def test_a_module_of_ours_that_is_missing_is_a_bug_and_shows(verb):
 def test_a_reader_that_leaves_early_causes_no_traceback():
     reader = subprocess.Popen(["true"], stdin=subprocess.PIPE)
     reader.wait()
-    code = "import sys, time; time.sleep(0.2); from tools.cli import main; sys.exit(main(['--help']))"
+    code = "import sys, time; time.sleep(0.2); from lira.tools.cli import main; sys.exit(main(['--help']))"
     done = subprocess.run(
         [sys.executable, "-c", code],
         stdout=reader.stdin,

@@ -9,8 +9,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from hal.bus import Bus
-from hal.messages import (
+from lira.hal.bus.bus import Bus
+from lira.hal.bus.topics import APPLIED, INFO, OPERATOR, OPERATOR_ANSWER
+from lira.hal.messages import (
     STOP,
     Applied,
     BatteryState,
@@ -26,24 +27,23 @@ from hal.messages import (
     Source,
     Twist,
 )
-from hal.profile import load_profile
-from hal.topics import APPLIED, INFO, OPERATOR, OPERATOR_ANSWER
-from tools.bench import null_robot
-from tools.bench.takeover import policy
-from tools.console import sound
-from tools.console.keyboard import keyboard_mapping, pad_of
-from tools.console.listen import Ears, decode_picture
-from tools.console.state import View, battery_share, driver_words, operator_words
-from tools.joystick.stick import action_of
-from tools.joystick.wheel import Wheel
-from tools.processes import ChildProcess, free_port, lira_command
+from lira.hal.profile import load_profile
+from lira.tools.bench import null_robot
+from lira.tools.bench.takeover import policy
+from lira.tools.console import sound
+from lira.tools.console.keyboard import keyboard_mapping, pad_of
+from lira.tools.console.listen import Ears, decode_picture
+from lira.tools.console.state import View, battery_share, driver_words, operator_words
+from lira.tools.joystick.axes import action_of
+from lira.tools.joystick.client import Wheel
+from lira.tools.launch.processes import ChildProcess, free_port, lira_command
 
 os.environ["SDL_VIDEODRIVER"] = os.environ["SDL_AUDIODRIVER"] = "dummy"
 
 pygame = pytest.importorskip("pygame", reason="needs pygame: pip install 'lira-rosbot[console]'")
-from tools.console.draw import BANNER, SIZE, draw, fan  # noqa: E402
-from tools.console.palette import AMBER, GREEN, RED, SKY  # noqa: E402
-from tools.console.window import Keyboard  # noqa: E402
+from lira.tools.console.draw import BANNER, SIZE, draw, fan  # noqa: E402
+from lira.tools.console.palette import AMBER, GREEN, RED, SKY  # noqa: E402
+from lira.tools.console.window import Keyboard  # noqa: E402
 
 SCAN = LaserScan(1.0, -math.pi / 2, math.pi / 4, 0.1, 4.0, np.array([1.0, math.inf, 2.0, math.nan, 1.0], np.float32))
 EXPERTS = (ExpertView("camera", (0.8, 0.5), 0.16, True), ExpertView("lidar", (0.7, -0.6), 0.01, False))
@@ -217,8 +217,8 @@ def test_a_truncated_picture_is_none():
 
 SLOW = """
 import sys, time
-from tools.cli import main
-from tools.console import window
+from lira.tools.cli import main
+from lira.tools.console import window
 draw = window.draw
 window.draw = lambda *words: (time.sleep(0.3), draw(*words))
 sys.exit(main(sys.argv[1:]))
@@ -228,8 +228,8 @@ sys.exit(main(sys.argv[1:]))
 @contextlib.contextmanager
 def null_robot_on_the_bus(tmp_path):
     name, endpoint = f"console{os.getpid()}", f"127.0.0.1:{free_port()}"
-    robot = [sys.executable, "-P", "-m", "tools.bench.null_robot", name, endpoint]
-    with ChildProcess("the robot", robot, tmp_path / "robot.log") as server:
+    robot = [sys.executable, "-m", "lira.tools.bench.null_robot", name, endpoint]
+    with ChildProcess("the robot", robot, tmp_path / "lira.robot.log") as server:
         server.wait_ready(null_robot.READY, 30.0)
         yield name, endpoint
 
@@ -255,7 +255,7 @@ def test_a_console_that_is_slow_stopped_or_killed_changes_nothing_in_control(tmp
         words = ["--name", name, "--connect", endpoint]
         commands = {
             "quick": lira_command("console", *words),
-            "slow": [sys.executable, "-P", "-c", SLOW, "console", *words],
+            "slow": [sys.executable, "-c", SLOW, "console", *words],
         }
         consoles = {}
         for pace, command in commands.items():
@@ -315,9 +315,9 @@ def test_the_keys_ask_and_say_that_nobody_answers(tmp_path):
 
 def test_the_keyboard_drives_locks_without_the_focus_and_comes_back(tmp_path):
     name, endpoint = f"keys{os.getpid()}", f"127.0.0.1:{free_port()}"
-    robot = [sys.executable, "-P", "-m", "tools.bench.null_robot", name, endpoint]
+    robot = [sys.executable, "-m", "lira.tools.bench.null_robot", name, endpoint]
     with contextlib.ExitStack() as stack:
-        server = stack.enter_context(ChildProcess("the robot", robot, tmp_path / "robot.log"))
+        server = stack.enter_context(ChildProcess("the robot", robot, tmp_path / "lira.robot.log"))
         server.wait_ready(null_robot.READY, 30.0)
         bus = Bus(name, connect=endpoint)
         stack.callback(bus.close)

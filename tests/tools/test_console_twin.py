@@ -8,16 +8,16 @@ from contextlib import ExitStack, contextmanager
 
 import pytest
 
-from fusion.demonstrations import read_demonstrations
-from hal.bus import Bus
-from hal.messages import Source
-from hal.topics import APPLIED, DECISION, INFO, OPERATOR_ANSWER
-from tools.joystick.wheel import Wheel
-from tools.processes import ChildProcess, free_port, lira_command
+from lira.fusion.log.label_log import read_demonstrations
+from lira.hal.bus.bus import Bus
+from lira.hal.bus.topics import APPLIED, DECISION, INFO, OPERATOR_ANSWER
+from lira.hal.messages import Source
+from lira.tools.joystick.client import Wheel
+from lira.tools.launch.processes import ChildProcess, free_port, lira_command
 
 os.environ["SDL_VIDEODRIVER"] = os.environ["SDL_AUDIODRIVER"] = "dummy"
 pytest.importorskip("pygame", reason="needs pygame: pip install 'lira-rosbot[console]'")
-from tools.console.window import FPS, Keyboard
+from lira.tools.console.window import FPS, Keyboard
 
 READY_S = 60.0
 
@@ -72,7 +72,7 @@ def test_a_person_teaches_with_the_keyboard_alone(tmp_path, method):
     with ExitStack() as stack:
         process = stack.enter_context(ChildProcess("the twin", twin, tmp_path / "twin.log"))
         process.wait_ready("serves world", READY_S)
-        learner = stack.enter_context(ChildProcess("the learner", fusion, tmp_path / "fusion.log"))
+        learner = stack.enter_context(ChildProcess("the learner", fusion, tmp_path / "lira.fusion.log"))
         hand, watch = stack.enter_context(typist(name, endpoint))
         decisions, applied, answers = (watch.reader(topic) for topic in (DECISION, APPLIED, OPERATOR_ANSWER))
         assert newest(decisions, lambda d: d.call == "feedback", READY_S).driver == "human"

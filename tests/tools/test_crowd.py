@@ -9,10 +9,10 @@ from contextlib import ExitStack
 import pytest
 from keyed_bed import NAME, make_keys, wait_for
 
-from hal.bus import Bus
-from hal.keys import load_keys
-from hal.topics import DIAGNOSTICS, INFO
-from tools.processes import ChildProcess, free_port, lira_command
+from lira.hal.bus.bus import Bus
+from lira.hal.bus.keys import load_keys
+from lira.hal.bus.topics import DIAGNOSTICS, INFO
+from lira.tools.launch.processes import ChildProcess, free_port, lira_command
 
 STRANGERS = 300
 HALF_A_RECORD = b"\x16\x03\x01\x02\x00"  # of a TLS handshake

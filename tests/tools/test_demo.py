@@ -12,10 +12,10 @@ from pathlib import Path
 import pytest
 from synthetic_run import write_run
 
-from hal.errors import ConfigError
-from tools.processes import ProcessError
-from tools.rig import Part
-from tools.verbs import demo
+from lira.hal.errors import ConfigError
+from lira.tools.launch.launch import Part
+from lira.tools.launch.processes import ProcessError
+from lira.tools.verbs import demo
 
 HERE = Path(__file__).parent
 TWIN = "import time; print(\"twin 'x' serves world 'line'\", flush=True); time.sleep(60)"
@@ -116,9 +116,9 @@ def test_ending_the_demo_ends_its_processes(tmp_path, number):
     child += "print('serves world', flush=True); time.sleep(60)"
     code = f"""
 import pathlib, sys
-from tools.rig import Part
-from tools.lifetime import interruptible
-from tools.verbs.demo import supervise
+from lira.tools.launch.launch import Part
+from lira.tools.launch.lifetime import interruptible
+from lira.tools.verbs.demo import supervise
 command = [sys.executable, "-c", {child!r}]
 parts = [Part("the twin", "twin.log", "serves", lambda _: command)]
 try:
@@ -141,11 +141,11 @@ except KeyboardInterrupt:
 
 def test_missing_experts_are_named_before_anything_starts(tmp_path):
     profile = tmp_path / "mine.toml"
-    like = resources.files("hal") / "profiles" / "thesis-sim.toml"
+    like = resources.files("lira.hal") / "profiles" / "thesis-sim.toml"
     profile.write_text(like.read_text(encoding="utf-8").replace('"thesis-sim"', '"mine"'))
     words = ["demo", "--profile", str(profile), "--run", str(tmp_path / "run")]
     code = "import sys; sys.modules.update(dict.fromkeys(['torch', 'pybullet', 'zenoh', 'safetensors']))\n"
-    code += f"from tools.cli import main; sys.exit(main({words!r}))"
+    code += f"from lira.tools.cli import main; sys.exit(main({words!r}))"
     done = subprocess.run(python(code), check=False, capture_output=True, text=True, timeout=30)
     assert done.returncode == 2
     assert done.stderr.splitlines()[0] == "lira demo: no camera expert comes with the profile 'mine'"

@@ -6,10 +6,10 @@ import pytest
 import torch
 from short_trials import SHORT, write_world
 
-from fusion.expert_files import shipped_path
-from hal.profile import load_profile
-from tools import cli
-from tools.processes import ChildProcess, free_port, lira_command
+from lira.fusion.experts.files import shipped_path
+from lira.hal.profile import load_profile
+from lira.tools import cli
+from lira.tools.launch.processes import ChildProcess, free_port, lira_command
 
 CAMERA = str(shipped_path("camera", load_profile("thesis-sim")))
 

@@ -15,15 +15,15 @@ import pytest
 from made_up_outcomes import HOLD
 from short_trials import short_trial, timeless, write_world
 
-from hal.errors import ConfigError
-from tools.cli import main
-from tools.experiments import fingerprint as fingerprints
-from tools.experiments.fingerprint import code, fingerprint, imported, sources
-from tools.experiments.kept import keep, kept
-from tools.experiments.pools import Cluster, Here
-from tools.experiments.runner import run_trials
-from tools.experiments.trial import play
-from tools.processes import free_port
+from lira.hal.errors import ConfigError
+from lira.tools.cli import main
+from lira.tools.experiments import fingerprint as fingerprints
+from lira.tools.experiments.fingerprint import code, fingerprint, imported, sources
+from lira.tools.experiments.kept import keep, kept
+from lira.tools.experiments.pools import Cluster, Here
+from lira.tools.experiments.runner import run_trials
+from lira.tools.experiments.trial import play
+from lira.tools.launch.processes import free_port
 
 START_S = 60.0
 
@@ -101,7 +101,7 @@ def test_a_cluster_that_would_play_otherwise_is_refused(world, tmp_path, workers
 
 @pytest.mark.filterwarnings("default")
 def test_a_cluster_that_is_not_there_is_named(monkeypatch, tmp_path, capsys):
-    monkeypatch.setattr("tools.experiments.pools.PATIENCE_S", 0.5)
+    monkeypatch.setattr("lira.tools.experiments.pools.PATIENCE_S", 0.5)
     address = f"tcp://127.0.0.1:{free_port()}"
     assert main(["experiment", "tableC1", "--seeds", "1", "--run", str(tmp_path), "--scheduler", address]) == 2
     assert "no Dask scheduler answers" in capsys.readouterr().err
@@ -143,7 +143,7 @@ def test_progress_is_a_bar_on_a_terminal_and_lines_elsewhere(terminal):
     script = (
         "import sys; sys.path.insert(0, 'tests/tools')\n"
         "from made_up_outcomes import HOLD, outcome\n"
-        "from tools.experiments.runner import Bar\n"
+        "from lira.tools.experiments.runner import Bar\n"
         "with Bar(3, 1) as bar:\n"
         "    bar.note(outcome(HOLD, 7))\n"
     )
@@ -188,8 +188,13 @@ def test_the_fingerprint_follows_the_world_and_the_experts(world, monkeypatch, t
 
 def test_the_fingerprint_covers_what_a_trial_runs_and_nothing_beside_it():
     names = {str(path.relative_to(fingerprints.ROOT)) for path in sources(fingerprints.START)}
-    assert {"fusion/lira.py", "fusion/hg_dagger.py", "fusion/teacher.py", "sim_backend/twin.py"} <= names
-    assert {"hal/governor.py", "tools/assembly.py", "tools/experiments/trial.py"} <= names
+    assert {
+        "fusion/methods/lira.py",
+        "fusion/methods/hg_dagger.py",
+        "fusion/teaching/teacher.py",
+        "sim_backend/twin.py",
+    } <= names
+    assert {"hal/safety/governor.py", "tools/runs/build.py", "tools/experiments/trial.py"} <= names
     assert not {"fusion/service.py", "tools/experiments/runner.py", "tools/cli.py"} & names
 
 
@@ -201,5 +206,16 @@ def test_comments_and_docstrings_do_not_count_as_code(tmp_path):
     assert code(path) == before
     path.write_text("def f(x):\n    return x + 2\n")
     assert code(path) != before
-    path.write_text("import hal.port\nfrom fusion import lira\n")
-    assert imported(path) == ["hal.port", "fusion", "fusion.lira"]
+    path.write_text("import lira.hal.port\nfrom lira.fusion.methods import lira\n")
+    assert imported(path) == ["lira.hal.port", "lira.fusion.methods", "lira.fusion.methods.lira"]
+
+
+def test_where_a_module_lies_does_not_count_as_code(tmp_path):
+    path = tmp_path / "module.py"
+    text = "from lira.hal import port\n\n\ndef f():\n    from lira.fusion import control\n    return port, control\n"
+    path.write_text(text)
+    before = code(path)
+    path.write_text(text.replace("lira.hal", "lira.hal.other").replace("lira.fusion", "lira.loop"))
+    assert code(path) == before
+    path.write_text("from lira.hal import port\n")
+    assert code(path) == b""

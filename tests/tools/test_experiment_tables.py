@@ -7,17 +7,18 @@ import msgspec
 import pytest
 from made_up_outcomes import HOLD, lap, outcome
 
-from fusion.ledger import Account
-from hal.errors import StorageError
-from tools.cli import main
-from tools.experiments import compare, densities, document, faults, methods, sharing, thresholds, trajectories
-from tools.experiments.experiment import Finding, Picture
-from tools.experiments.measures import driving_row, effort_row, label_row, source_rows
-from tools.experiments.page import write_page
-from tools.experiments.registry import REGISTRY, load
-from tools.experiments.summary import read_summary, summarise, to_json
-from tools.experiments.trial import Trial
-from tools.verbs.experiment import chosen_methods
+from lira.fusion.log.counts import Account
+from lira.hal.errors import StorageError
+from lira.tools.cli import main
+from lira.tools.experiments import document, methods
+from lira.tools.experiments.experiment import Finding, Picture
+from lira.tools.experiments.measures import driving_row, effort_row, label_row, source_rows
+from lira.tools.experiments.page import write_page
+from lira.tools.experiments.registry import REGISTRY, load
+from lira.tools.experiments.studies import compare, densities, faults, sharing, thresholds, trajectories
+from lira.tools.experiments.summary import read_summary, summarise, to_json
+from lira.tools.experiments.trial import Trial
+from lira.tools.verbs.experiment import chosen_methods
 
 
 def test_labels_of_a_group_in_the_columns_of_table_2():

@@ -4,11 +4,11 @@ import msgspec
 import pytest
 from made_up_outcomes import lap, outcome
 
-from fusion.syllabus import Syllabus
-from tools.experiments import unseen
-from tools.experiments.registry import REGISTRY, load
-from tools.experiments.summary import read_summary, summarise, to_json
-from tools.verbs.experiment import chosen_methods
+from lira.fusion.methods.syllabus import Syllabus
+from lira.tools.experiments.registry import REGISTRY, load
+from lira.tools.experiments.studies import unseen
+from lira.tools.experiments.summary import read_summary, summarise, to_json
+from lira.tools.verbs.experiment import chosen_methods
 
 
 def run(method, seed, *, labels=20, passed=12, converged=True, collisions=0, experts=None):

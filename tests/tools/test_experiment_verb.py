@@ -7,9 +7,9 @@ import pytest
 from made_up_outcomes import HOLD
 from short_trials import short_trial, write_world
 
-from tools.cli import main
-from tools.experiments.registry import REGISTRY, load
-from tools.verbs import experiment as verb
+from lira.tools.cli import main
+from lira.tools.experiments.registry import REGISTRY, load
+from lira.tools.verbs import experiment as verb
 
 
 @pytest.fixture

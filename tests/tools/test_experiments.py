@@ -4,13 +4,13 @@ import numpy as np
 import pytest
 from short_trials import short_trial, timeless, write_world
 
-from hal.errors import StorageError
-from tools.cli import main
-from tools.experiments.compare import ratios, summary
-from tools.experiments.kept import kept
-from tools.experiments.pools import Here
-from tools.experiments.runner import run_trials
-from tools.experiments.statistics import bootstrap, iqm, median_interval, paired_ratios
+from lira.hal.errors import StorageError
+from lira.tools.cli import main
+from lira.tools.experiments.kept import kept
+from lira.tools.experiments.pools import Here
+from lira.tools.experiments.runner import run_trials
+from lira.tools.experiments.statistics import bootstrap, iqm, median_interval, paired_ratios
+from lira.tools.experiments.studies.compare import ratios, summary
 
 
 @pytest.fixture

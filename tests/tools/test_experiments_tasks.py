@@ -3,12 +3,12 @@
 import msgspec
 import pytest
 
-from fusion.checkpoint import Checkpoint, save_checkpoint
-from fusion.networks import CameraNet, LidarNet
-from fusion.record import LapRecord, ResultRecord
-from tools import training
-from tools.experiments import corridor, passage, table1
-from tools.experiments.trial import Outcome
+from lira.fusion.log.run_log import LapRecord, ResultRecord
+from lira.fusion.policies.checkpoint import Checkpoint, save_checkpoint
+from lira.fusion.policies.networks import CameraNet, LidarNet
+from lira.tools.experiments.studies import corridor, passage, table1
+from lira.tools.experiments.trial import Outcome
+from lira.tools.runs import expert_training as training
 
 LAP = LapRecord("train", 1, 0, True, False, 30.0, 0, 0, 0.1, 20, 5, 9, 80, 2, 1.0)
 

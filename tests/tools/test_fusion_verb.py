@@ -12,18 +12,18 @@ import numpy as np
 import pytest
 import torch
 
-from fusion.checkpoint import Checkpoint, save_checkpoint
-from fusion.demonstrations import Demonstration, DemonstrationLog
-from fusion.expert_files import shipped_path
-from fusion.networks import LidarNet
-from hal import remote
-from hal.bus import Bus
-from hal.governed import GovernedRobot
-from hal.null import NullRobot
-from hal.profile import load_profile
-from hal.server import HalServer
-from tools import cli
-from tools.processes import free_port
+from lira.fusion.experts.files import shipped_path
+from lira.fusion.log.label_log import Demonstration, DemonstrationLog
+from lira.fusion.policies.checkpoint import Checkpoint, save_checkpoint
+from lira.fusion.policies.networks import LidarNet
+from lira.hal.bus.bus import Bus
+from lira.hal.client import remote
+from lira.hal.profile import load_profile
+from lira.hal.safety.governed import GovernedRobot
+from lira.hal.server.server import HalServer
+from lira.hal.testing import NullRobot
+from lira.tools import cli
+from lira.tools.launch.processes import free_port
 
 PROFILE, OTHER = load_profile("thesis-sim"), load_profile("rosbot2")
 WORLD = {"description": "a line", "name": "mine", "line": {"pieces": [{"straight_m": 9.0}]}}
@@ -214,7 +214,7 @@ def test_the_demo_names_a_folder_that_cannot_be_made(refused, tmp_path):
     ],
 )
 def test_a_missing_extra_says_what_to_install(package, extra, words, tmp_path):
-    code = f"import sys; sys.modules[{package!r}] = None\nfrom tools.cli import main; sys.exit(main({words!r}))"
+    code = f"import sys; sys.modules[{package!r}] = None\nfrom lira.tools.cli import main; sys.exit(main({words!r}))"
     done = subprocess.run(
         [sys.executable, "-c", code], check=False, capture_output=True, text=True, timeout=60, cwd=tmp_path
     )

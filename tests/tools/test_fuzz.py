@@ -4,12 +4,12 @@ import random
 
 import pytest
 
-from hal.messages import Source
-from hal.ros import CODECS
-from tools.bench import BENCHES, fuzz
-from tools.bench.soak import Watched, Work, growth, rise
-from tools.cli import main
-from tools.verbs.bench import exit_status
+from lira.hal.messages import Source
+from lira.hal.messages.ros_table import CODECS
+from lira.tools.bench import BENCHES, fuzz
+from lira.tools.bench.soak import Watched, Work, growth, rise
+from lira.tools.cli import main
+from lira.tools.verbs.bench import exit_status
 
 
 def test_garbage_ends_in_a_value_or_in_the_decoders_own_error():

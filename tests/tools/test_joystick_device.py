@@ -3,11 +3,11 @@ import sys
 
 import pytest
 
-from hal.errors import DeviceError
-from tools.joystick.learn import moved_axis, pressed_button
-from tools.joystick.mapping import load_mapping
-from tools.joystick.nodes import Node, choose, fits, is_any_pad, motion_of, parse_bitmap, read_nodes
-from tools.joystick.stick import AxisRange, PadState
+from lira.hal.errors import DeviceError
+from lira.tools.joystick.axes import AxisRange, PadState
+from lira.tools.joystick.mapping import load_mapping
+from lira.tools.joystick.nodes import Node, choose, fits, is_any_pad, motion_of, parse_bitmap, read_nodes
+from lira.tools.joystick.pad_detect import moved_axis, pressed_button
 
 PS3 = load_mapping("ps3")
 KEYS = frozenset(range(304, 319))
@@ -111,7 +111,7 @@ class Motors:
 
 
 def test_motors_stop_for_certain_and_leave_no_effect_behind():
-    pad = pytest.importorskip("tools.joystick.pad", reason="needs evdev: pip install 'lira-rosbot[joystick]'")
+    pad = pytest.importorskip("lira.tools.joystick.pad", reason="needs evdev: pip install 'lira-rosbot[joystick]'")
     device = Motors()
     motor = pad.Motor(device)
     for strength in (1.0, 1.0, 0.5, 0.0, 0.0):
@@ -122,7 +122,7 @@ def test_motors_stop_for_certain_and_leave_no_effect_behind():
 
 
 def test_a_pad_that_goes_while_it_rumbles_raises_nothing():
-    pad = pytest.importorskip("tools.joystick.pad", reason="needs evdev: pip install 'lira-rosbot[joystick]'")
+    pad = pytest.importorskip("lira.tools.joystick.pad", reason="needs evdev: pip install 'lira-rosbot[joystick]'")
     pad.Motor(Motors(gone=True)).set(1.0)
 
 
@@ -130,7 +130,7 @@ def test_a_pad_that_goes_while_it_rumbles_raises_nothing():
 def test_help_needs_neither_pygame_nor_evdev(verb):
     code = (
         "import sys; sys.modules.update(dict.fromkeys(['pygame', 'evdev', 'zenoh', 'cv2'])); "
-        f"from tools.cli import main; main([{verb!r}, '--help'])"
+        f"from lira.tools.cli import main; main([{verb!r}, '--help'])"
     )
     done = subprocess.run([sys.executable, "-c", code], check=False, capture_output=True, text=True, timeout=60)
     assert done.returncode == 0, done.stderr
@@ -141,7 +141,7 @@ def test_help_needs_neither_pygame_nor_evdev(verb):
     ("verb", "package", "extra"), [("joystick", "evdev", "joystick"), ("console", "pygame", "console")]
 )
 def test_a_missing_package_is_named_before_a_robot_is_looked_for(verb, package, extra):
-    code = f"import sys; sys.modules[{package!r}] = None; from tools.cli import main; sys.exit(main([{verb!r}]))"
+    code = f"import sys; sys.modules[{package!r}] = None; from lira.tools.cli import main; sys.exit(main([{verb!r}]))"
     done = subprocess.run([sys.executable, "-c", code], check=False, capture_output=True, text=True, timeout=60)
     assert done.returncode == 2
     assert done.stderr.splitlines() == [
@@ -153,13 +153,13 @@ def test_a_missing_package_is_named_before_a_robot_is_looked_for(verb, package, 
 def test_the_bridge_needs_no_pygame():
     code = (
         "import sys; sys.modules['pygame'] = None; "
-        "import tools.joystick.bridge, tools.joystick.pad, tools.joystick.wheel, tools.joystick.ask"
+        "import lira.tools.joystick.bridge, lira.tools.joystick.pad, lira.tools.joystick.client, lira.tools.joystick.pad_wizard"
     )
     assert subprocess.run([sys.executable, "-c", code], check=False, timeout=60).returncode == 0
 
 
 def test_an_unknown_pad_is_refused_before_a_robot_is_looked_for():
-    command = [sys.executable, "-P", "-m", "tools", "joystick", "--pad", "nosuch"]
+    command = [sys.executable, "-m", "lira.tools", "joystick", "--pad", "nosuch"]
     done = subprocess.run(command, check=False, capture_output=True, text=True, timeout=60)
     assert done.returncode == 2
     assert "unknown pad 'nosuch'" in done.stderr

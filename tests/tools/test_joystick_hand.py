@@ -2,10 +2,10 @@ import itertools
 
 import pytest
 
-from tools.joystick.codes import AXES, BUTTONS, EV_ABS, EV_KEY
-from tools.joystick.hand import RELEASE_S, TRANSITIONS, ZERO, ZEROS_S, Event, Hand, Order, State
-from tools.joystick.mapping import load_mapping
-from tools.joystick.stick import AxisRange, PadEvent, PadState
+from lira.tools.joystick.axes import AxisRange, PadEvent, PadState
+from lira.tools.joystick.codes import AXES, BUTTONS, EV_ABS, EV_KEY
+from lira.tools.joystick.deadman import RELEASE_S, TRANSITIONS, ZERO, ZEROS_S, Event, Hand, Order, State
+from lira.tools.joystick.mapping import load_mapping
 
 PS3 = load_mapping("ps3")
 RANGES = dict.fromkeys(range(6), AxisRange(0, 255))

@@ -4,14 +4,14 @@ import itertools
 
 import pytest
 
-from hal.messages import OperatorRequest, Request
-from tools.console.keyboard import pad_of
-from tools.joystick.codes import BUTTONS
-from tools.joystick.freeze import GAPS, FreezeWatch
-from tools.joystick.mapping import load_mapping
-from tools.joystick.memory import PadMemory, state_file
-from tools.joystick.requests import HOLD_S, RequestButtons
-from tools.joystick.stick import PadState
+from lira.hal.messages import OperatorRequest, Request
+from lira.tools.console.keyboard import pad_of
+from lira.tools.joystick.axes import PadState
+from lira.tools.joystick.codes import BUTTONS
+from lira.tools.joystick.freeze import GAPS, FreezeWatch
+from lira.tools.joystick.known_pads import PadMemory, state_file
+from lira.tools.joystick.mapping import load_mapping
+from lira.tools.joystick.requests import HOLD_S, RequestButtons
 
 PS3 = load_mapping("ps3")
 EXPERTS = ("camera", "lidar")

@@ -6,13 +6,13 @@ import time
 import pytest
 from pad_bed import SONY, Bed, library
 
-from fusion.demonstrations import read_demonstrations
-from fusion.record import RunRecord, StepRecord, read_run
-from hal.bus import Bus
-from hal.messages import STOP, Source
-from hal.topics import APPLIED, DECISION, OPERATOR_ANSWER, SIM_STATE
-from tools.bench import takeover
-from tools.processes import ChildProcess, free_port, lira_command
+from lira.fusion.log.label_log import read_demonstrations
+from lira.fusion.log.run_log import RunRecord, StepRecord, read_run
+from lira.hal.bus.bus import Bus
+from lira.hal.bus.topics import APPLIED, DECISION, OPERATOR_ANSWER, SIM_STATE
+from lira.hal.messages import STOP, Source
+from lira.tools.bench import takeover
+from lira.tools.launch.processes import ChildProcess, free_port, lira_command
 
 if library() is None:
     pytest.skip("needs libumockdev (Debian package umockdev)", allow_module_level=True)
@@ -85,7 +85,7 @@ def test_twin_and_joystick_drive_with_nothing_else_running(bed, hand, watch):
 
 def learner(address, tmp_path, *words):
     command = lira_command("fusion", "--name", address[0], "--connect", address[1], "--run", str(tmp_path / "run"))
-    return ChildProcess("the learner", [*command, *words], tmp_path / "fusion.log")
+    return ChildProcess("the learner", [*command, *words], tmp_path / "lira.fusion.log")
 
 
 @pytest.mark.parametrize("method", ["lira", "hg-dagger"])

@@ -11,15 +11,15 @@ import time
 import pytest
 from pad_bed import SONY, Bed, library
 
-from hal.bus import Bus
-from hal.estop import look_at_estop
-from hal.governed import GovernedRobot
-from hal.messages import STOP, OperatorRequest, Reason, Request, Source
-from hal.null import NullRobot
-from hal.profile import load_profile
-from hal.server import HalServer
-from hal.topics import APPLIED, JOY, OPERATOR, TELEOP
-from tools.processes import ChildProcess, free_port, lira_command
+from lira.hal.bus.bus import Bus
+from lira.hal.bus.topics import APPLIED, JOY, OPERATOR, TELEOP
+from lira.hal.messages import STOP, OperatorRequest, Reason, Request, Source
+from lira.hal.profile import load_profile
+from lira.hal.safety.governed import GovernedRobot
+from lira.hal.server.estop_service import look_at_estop
+from lira.hal.server.server import HalServer
+from lira.hal.testing import NullRobot
+from lira.tools.launch.processes import ChildProcess, free_port, lira_command
 
 if library() is None:
     pytest.skip("needs libumockdev (Debian package umockdev)", allow_module_level=True)
@@ -327,7 +327,7 @@ def test_learn_asks_and_writes_a_file_that_loads(bed, start, tmp_path):
         rig.says(f"... {name}")
         send(PAD, name, rest)
     assert rig.process.wait(30.0) == 0  # save and reset go unanswered
-    from tools.joystick.mapping import load_mapping
+    from lira.tools.joystick.mapping import load_mapping
 
     mapping = load_mapping(str(path))
     assert (mapping.forward.axis, mapping.forward.inverted, mapping.turn.axis) == ("ABS_Y", True, "ABS_RX")

@@ -3,9 +3,9 @@ import json
 import numpy as np
 import pytest
 
-from fusion.demonstrations import Demonstration, DemonstrationLog, read_demonstrations
-from hal.profile import load_profile
-from tools.cli import main
+from lira.fusion.log.label_log import Demonstration, DemonstrationLog, read_demonstrations
+from lira.hal.profile import load_profile
+from lira.tools.cli import main
 
 SIM = load_profile("thesis-sim")
 

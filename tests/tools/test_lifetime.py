@@ -8,13 +8,13 @@ import time
 
 import pytest
 
-from hal.errors import StorageError
-from tools.lifetime import CLOSE_S, PATIENCE_S, Interrupted, heard, interruptible, saving
+from lira.hal.errors import StorageError
+from lira.tools.launch.lifetime import CLOSE_S, PATIENCE_S, Interrupted, heard, interruptible, saving
 
 # It hears of a signal, and heeds it or not.
 CLIENT = """
 import signal, sys, time
-from tools.lifetime import interruptible, stop_or_interrupt, saving
+from lira.tools.launch.lifetime import interruptible, stop_or_interrupt, saving
 signal.signal(signal.SIGHUP, signal.SIG_DFL)  # whatever the shell that runs the tests has ignored
 with interruptible():
     try:
@@ -91,7 +91,7 @@ def test_a_thread_that_writes_in_vain_ends_the_process_with_what_it_met():
 
 
 def test_a_process_with_a_dead_link_leaves_without_waiting_for_it_and_tidies_up(tmp_path):
-    code = "import sys, tempfile, threading, time; from tools.lifetime import leave\n"
+    code = "import sys, tempfile, threading, time; from lira.tools.launch.lifetime import leave\n"
     code += f"folder = tempfile.TemporaryDirectory(dir={str(tmp_path)!r}); print('x')\n"
     code += "threading.Thread(target=time.sleep, args=[60]).start(); leave(3)"
     done = subprocess.run([sys.executable, "-c", code], check=False, capture_output=True, text=True, timeout=10)

@@ -3,9 +3,9 @@
 import pytest
 from short_trials import write_world
 
-from fusion.presets import METHODS
-from fusion.teacher import PERFECT
-from tools.experiments.trial import Trial, play
+from lira.fusion.methods.presets import METHODS
+from lira.fusion.teaching.teacher import PERFECT
+from lira.tools.experiments.trial import Trial, play
 
 KINDS = (
     *("hold-fixed", "hold-scratch", "hold-mirrored", "hg-dagger-warm", "hg-dagger-doubt", "cloning", "switching"),

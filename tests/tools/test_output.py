@@ -7,8 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from tools import cli
-from tools.processes import free_port, lira_command
+from lira.tools import cli
+from lira.tools.launch.processes import free_port, lira_command
 
 END_S = 5.0
 FULL = Path("/dev/full")
@@ -33,8 +33,8 @@ def one_line_and_remedy(done):
     "words", [["--help"], ["twin", "--help"], ["labels", "check", "{log}"], ["labels", "check", "{log}", "--json", "-"]]
 )
 def test_a_full_disk_behind_standard_output(tmp_path, words):
-    from fusion.demonstrations import DemonstrationLog
-    from hal.profile import load_profile
+    from lira.fusion.log.label_log import DemonstrationLog
+    from lira.hal.profile import load_profile
 
     DemonstrationLog(tmp_path / "log", load_profile("thesis-sim")).close()
     with FULL.open("w") as full:

@@ -13,22 +13,22 @@ import cv2
 import numpy as np
 import pytest
 
-from hal.bus import Bus
-from hal.errors import BusError
-from hal.governed import GovernedRobot
-from hal.messages import Applied, Command, CompressedImage, Imu, LaserScan, Odometry, Reason, Source, Twist
-from hal.profile import load_profile
-from hal.server import HalServer
-from sim_backend.twin import Twin
-from tools import cli
-from tools.parity import motion
-from tools.parity.compare import DIFFERS, MISSING, SAME, compare
-from tools.parity.page import render
-from tools.parity.record import Heard, InterruptedScriptError, Recording, Span, record
-from tools.parity.script import motions
-from tools.parity.sight import match_scans
-from tools.processes import free_port
-from tools.verbs import parity
+from lira.hal.bus.bus import Bus
+from lira.hal.errors import BusError
+from lira.hal.messages import Applied, Command, CompressedImage, Imu, LaserScan, Odometry, Reason, Source, Twist
+from lira.hal.profile import load_profile
+from lira.hal.safety.governed import GovernedRobot
+from lira.hal.server.server import HalServer
+from lira.sim_backend.twin import Twin
+from lira.tools import cli
+from lira.tools.launch.processes import free_port
+from lira.tools.parity import motion
+from lira.tools.parity.compare import DIFFERS, MISSING, SAME, compare
+from lira.tools.parity.page import render
+from lira.tools.parity.record import Heard, InterruptedScriptError, Recording, Span, record
+from lira.tools.parity.script import motions
+from lira.tools.parity.sight import match_scans
+from lira.tools.verbs import parity
 
 PROFILE = load_profile("rosbot2")
 WALLS = (3.0, -1.5, 2.0, -1.2)  # of a room, seen from the robot: ahead, behind, left, right
@@ -236,7 +236,7 @@ def test_somebody_else_at_the_wheel_is_an_error():
         other, stop = Bus(bus.robot, connect=bus.endpoint), threading.Event()
 
         def drive():
-            from hal.remote import RemoteRobot
+            from lira.hal.client.remote import RemoteRobot
 
             robot = RemoteRobot(other)
             robot.open()

@@ -5,8 +5,8 @@ import time
 
 import pytest
 
-from tools import processes
-from tools.processes import ChildProcess, ProcessError, free_port, lira_command
+from lira.tools.launch import processes
+from lira.tools.launch.processes import ChildProcess, ProcessError, free_port, lira_command
 
 READY_THEN_SLEEP = "import time; print('ready to serve', flush=True); time.sleep(60)"
 DEAF = """

@@ -3,10 +3,10 @@ import io
 import pytest
 from synthetic_run import write_run
 
-from fusion.record import LapRecord, StepRecord, read_run
-from hal.errors import StorageError
-from tools import progress
-from tools.progress import Display, Progress, Tail
+from lira.fusion.log.run_log import LapRecord, StepRecord, read_run
+from lira.hal.errors import StorageError
+from lira.tools.runs import progress
+from lira.tools.runs.progress import Display, Progress, Tail
 
 
 class Terminal(io.StringIO):

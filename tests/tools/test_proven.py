@@ -3,8 +3,8 @@
 import pytest
 from made_up_outcomes import lap
 
-from fusion.record import ResultRecord
-from tools.proven import proof_words, share, share_words, unseen_words
+from lira.fusion.log.run_log import ResultRecord
+from lira.tools.output.proven import proof_words, share, share_words, unseen_words
 
 
 @pytest.mark.parametrize(

@@ -5,14 +5,14 @@ import msgspec
 import pytest
 from synthetic_run import write_run
 
-from fusion.record import LapRecord, StepRecord, read_run
-from hal.errors import StorageError
-from sim_backend.catalogue import load_world
-from tools import cli
-from tools.report import write_report
-from tools.report.course import NOTHING, course
-from tools.report.digest import digest, load_run
-from tools.report.plots import histogram, nice_step, top_view
+from lira.fusion.log.run_log import LapRecord, StepRecord, read_run
+from lira.hal.errors import StorageError
+from lira.sim_backend.catalogue import load_world
+from lira.tools import cli
+from lira.tools.report import write_report
+from lira.tools.report.course import NOTHING, course
+from lira.tools.report.digest import digest, load_run
+from lira.tools.report.plots import histogram, nice_step, top_view
 
 VOID = {"meta", "img", "br"}
 

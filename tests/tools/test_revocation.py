@@ -7,15 +7,15 @@ from datetime import timedelta
 import pytest
 from keyed_bed import GO, NAME, drive_until, make_keys, serving, wait_for
 
-from hal.bus import Bus
-from hal.errors import BusError
-from hal.estop import look_at_estop
-from hal.keys import CA, CERTIFICATE, KEY, ROLES, load_keys
-from hal.messages import STOP, Command, Reason
-from hal.remote import RemoteRobot
-from tools.authority import enroll, enrolled, renew
-from tools.cli import main
-from tools.processes import free_port
+from lira.hal.bus.bus import Bus
+from lira.hal.bus.keys import CA, CERTIFICATE, KEY, ROLES, load_keys
+from lira.hal.client.remote import RemoteRobot
+from lira.hal.errors import BusError
+from lira.hal.messages import STOP, Command, Reason
+from lira.hal.server.estop_service import look_at_estop
+from lira.tools.authority import enroll, enrolled, renew
+from lira.tools.cli import main
+from lira.tools.launch.processes import free_port
 
 SHUT_OUT_S = 5.0
 

@@ -11,18 +11,18 @@ from itertools import groupby
 
 import pytest
 
-from hal.messages import Reason, Twist
-from tools.cli import main
-from tools.processes import free_port
-from tools.relay import Narrows, Relay
-from tools.stop_test.cull import cull, judge_mutant, rows_of
-from tools.stop_test.journal import Heard, Journal, JournalReader, JournalWriter, Said, Sent, Truth, Wheels
-from tools.stop_test.matrix import Matrix, missing
-from tools.stop_test.mutants import MUTANTS, MutantError, break_product, swap
-from tools.stop_test.rows import ROWS
-from tools.stop_test.sender import Pen
-from tools.stop_test.setups import clock_library
-from tools.stop_test.verdict import Bounds, Rules, judge, summarize
+from lira.hal.messages import Reason, Twist
+from lira.tools.cli import main
+from lira.tools.launch.link_fault import Narrows, Relay
+from lira.tools.launch.processes import free_port
+from lira.tools.stop_test.cull import cull, judge_mutant, rows_of
+from lira.tools.stop_test.journal import Heard, Journal, JournalReader, JournalWriter, Said, Sent, Truth, Wheels
+from lira.tools.stop_test.matrix import Matrix, missing
+from lira.tools.stop_test.mutants import MUTANTS, MutantError, break_product, swap
+from lira.tools.stop_test.rows import ROWS
+from lira.tools.stop_test.sender import Pen
+from lira.tools.stop_test.setups import clock_library
+from lira.tools.stop_test.verdict import Bounds, Rules, judge, summarize
 
 STEP_S = 0.05
 RULES = Rules(began_s=0.5, broken_s=1.0, mended_s=2.0, end_s=3.0)
@@ -273,7 +273,7 @@ def test_a_journal_reads_back_in_order_up_to_a_torn_end(tmp_path):
         writers[number % 2].note(record)
     for writer in writers:
         writer.close()
-    with (reader.folder / "robot.bin").open("ab") as file:
+    with (reader.folder / "lira.robot.bin").open("ab") as file:
         file.write(b"torn")
     journal = reader.read()
     assert journal.sent == [records[0], records[5]]

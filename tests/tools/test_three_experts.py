@@ -5,23 +5,23 @@ from itertools import pairwise
 
 import pytest
 
-from fusion.control import ControlLoop
-from fusion.experts import load_expert
-from fusion.journal import Journal
-from fusion.learner import Learner
-from fusion.lira import PRESETS, LiraSpf
-from fusion.method import Expert
-from fusion.networks import FusionNet
-from fusion.novice import LearningSettings, NetworkNovice
-from fusion.record import RunRecord, RunWriter, read_run
-from fusion.trainer import InlineTrainer
-from hal.governed import GovernedRobot
-from hal.profile import load_profile
-from sim_backend.twin import Twin
-from tools.console import draw
-from tools.console.sample import sample_view
-from tools.report import write_report
-from tools.report.digest import load_run
+from lira.fusion.control import ControlLoop
+from lira.fusion.experts.load import load_expert
+from lira.fusion.learning.learner import Learner
+from lira.fusion.learning.novice import LearningSettings, NetworkNovice
+from lira.fusion.learning.trainer import InlineTrainer
+from lira.fusion.log.recorder import Journal
+from lira.fusion.log.run_log import RunRecord, RunWriter, read_run
+from lira.fusion.methods.base import Expert
+from lira.fusion.methods.lira import PRESETS, LiraSpf
+from lira.fusion.policies.networks import FusionNet
+from lira.hal.profile import load_profile
+from lira.hal.safety.governed import GovernedRobot
+from lira.sim_backend.twin import Twin
+from lira.tools.console import draw
+from lira.tools.console.sample import sample_view
+from lira.tools.report import write_report
+from lira.tools.report.digest import load_run
 
 PROFILE = load_profile("thesis-sim")
 STEPS = 60

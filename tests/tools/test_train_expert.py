@@ -5,11 +5,11 @@ import signal
 import pytest
 import torch
 
-from fusion.checkpoint import load_checkpoint
-from fusion.curriculum import CURRICULA, STRICT, Curriculum
-from fusion.session import Drive
-from hal.messages import Episode
-from tools import cli
+from lira.fusion.policies.checkpoint import load_checkpoint
+from lira.fusion.teaching.curriculum import CURRICULA, STRICT, Curriculum
+from lira.fusion.teaching.session import Drive
+from lira.hal.messages import Episode
+from lira.tools import cli
 
 
 @pytest.fixture(autouse=True)

@@ -5,18 +5,18 @@ import sys
 import msgspec
 import pytest
 
-from hal.bus import Bus
-from hal.messages import STOP, Command, Twist
-from hal.remote import RemoteArena, RemoteRobot
-from sim_backend.catalogue import load_world
-from sim_backend.world import World
-from tools.processes import ChildProcess, free_port, lira_command
+from lira.hal.bus.bus import Bus
+from lira.hal.client.remote import RemoteArena, RemoteRobot
+from lira.hal.messages import STOP, Command, Twist
+from lira.sim_backend.catalogue import load_world
+from lira.sim_backend.world import World
+from lira.tools.launch.processes import ChildProcess, free_port, lira_command
 
 
 def lira(*words, block=()):
     """Run `lira` in a process of its own; importing a package in `block` fails as if it were not installed."""
     code = f"import sys; sys.modules.update(dict.fromkeys({list(block)!r}))\n"
-    code += f"from tools.cli import main; sys.exit(main({list(words)!r}))"
+    code += f"from lira.tools.cli import main; sys.exit(main({list(words)!r}))"
     return subprocess.run([sys.executable, "-c", code], check=False, capture_output=True, text=True, timeout=60)
 
 

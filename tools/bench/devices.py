@@ -1,6 +1,6 @@
 """The robot's lidar and base on pseudo-terminals, in a process of their own: as on the robot, their time is not ours.
 
-Run as `python -m tools.bench.devices FOLDER MODE`; it says `ready`, and once told to stop it writes `journal.json`.
+`python -m lira.tools.bench.devices FOLDER MODE` says `ready`, and once told to stop it writes `journal.json`.
 """
 
 import json
@@ -13,13 +13,13 @@ from pathlib import Path
 
 import numpy as np
 
-from hal.messages import Odometry
-from hal.server import stop_on_signal
-from sim_backend.emulators.core2 import Core2Unit, Firmware
-from sim_backend.emulators.rplidar import DENSE_MODE, EXPRESS_MODE, STANDARD_MODE, Model, RplidarUnit, ScanMode
-from sim_backend.emulators.wire import Wire
-from sim_backend.polyline import Floats
-from tools.processes import ChildProcess
+from lira.hal.messages import Odometry
+from lira.hal.server.server import stop_on_signal
+from lira.sim_backend.emulators.core2 import Core2Unit, Firmware
+from lira.sim_backend.emulators.rplidar import DENSE_MODE, EXPRESS_MODE, STANDARD_MODE, Model, RplidarUnit, ScanMode
+from lira.sim_backend.emulators.wire import Wire
+from lira.sim_backend.polyline import Floats
+from lira.tools.launch.processes import ChildProcess
 
 MODES: dict[str, ScanMode] = {"standard": STANDARD_MODE, "express": EXPRESS_MODE, "dense": DENSE_MODE}
 READY_S = 30.0
@@ -87,7 +87,7 @@ class Devices:
 @contextmanager
 def devices(folder: Path, mode: str) -> Iterator[Devices]:
     """Start the process, with a lidar that offers `mode` and the standard one."""
-    command = [sys.executable, "-P", "-m", "tools.bench.devices", str(folder), mode]
+    command = [sys.executable, "-m", "lira.tools.bench.devices", str(folder), mode]
     with ChildProcess("the devices", command, folder / "devices.log") as child:
         child.wait_ready("ready", READY_S)
         yield Devices(folder, child)

@@ -5,20 +5,20 @@ import time
 
 import numpy as np
 
-from hal.messages import Odometry
-from hal.profile import load_profile
-from robot.core2.board import Board
-from robot.core2.rosserial import parse_frames
-from robot.rplidar.device import Counts, Stream
-from robot.rplidar.points import PARSERS
-from robot.rplidar.protocol import Answer
-from robot.rplidar.turn import Mounting, TurnCutter
-from robot.settings import BaseSettings
-from sim_backend.emulators.core2 import Core2Unit, Firmware
-from sim_backend.emulators.rplidar import Model, RplidarUnit, ScanMode
-from tools.bench import Row
-from tools.bench.devices import MODES
-from tools.bench.scan_age import endurance, live
+from lira.hal.messages import Odometry
+from lira.hal.profile import load_profile
+from lira.robot.core2.board import Board
+from lira.robot.core2.rosserial import parse_frames
+from lira.robot.rplidar.device import Counts, Stream
+from lira.robot.rplidar.points import PARSERS
+from lira.robot.rplidar.protocol import Answer
+from lira.robot.rplidar.turn import Mounting, TurnCutter
+from lira.robot.settings import BaseSettings
+from lira.sim_backend.emulators.core2 import Core2Unit, Firmware
+from lira.sim_backend.emulators.rplidar import Model, RplidarUnit, ScanMode
+from lira.tools.bench import Row
+from lira.tools.bench.devices import MODES
+from lira.tools.bench.scan_age import endurance, live
 
 RUNS = 5
 STREAM_S = 10.0

@@ -13,20 +13,20 @@ from functools import partial
 import msgspec
 import numpy as np
 
-from fusion.preprocess import gray_image
-from hal.attachment import Attachment, parse_attachment
-from hal.codec import decode, encode
-from hal.desk import REALTIME, Info, info_from_json, reset_time
-from hal.errors import LiraError
-from hal.estop import EstopState
-from hal.messages import CompressedImage, Episode, Image
-from hal.outlet import compress
-from hal.profile import load_profile, profile_from_json
-from hal.ros import CODECS
-from sim_backend.catalogue import load_world
-from sim_backend.world import World
-from tools.bench import Row
-from tools.bench.samples import of_kind
+from lira.fusion.preprocess import gray_image
+from lira.hal.bus.attachment import Attachment, parse_attachment
+from lira.hal.errors import LiraError
+from lira.hal.messages import CompressedImage, Episode, Image
+from lira.hal.messages.codec import decode, encode
+from lira.hal.messages.ros_table import CODECS
+from lira.hal.profile import load_profile, profile_from_json
+from lira.hal.server.estop_service import EstopState
+from lira.hal.server.info_service import REALTIME, Info, info_from_json, reset_time
+from lira.hal.server.sensor_publisher import compress
+from lira.sim_backend.catalogue import load_world
+from lira.sim_backend.world import World
+from lira.tools.bench import Row
+from lira.tools.bench.samples import of_kind
 
 INPUTS = 100_000
 SEED = 1

@@ -12,15 +12,15 @@ from tempfile import TemporaryDirectory
 
 import numpy as np
 
-from hal.attachment import Attachment
-from hal.bus import Bus
-from hal.codec import encode
-from hal.errors import BusError
-from hal.messages import STOP, Command, LaserScan
-from hal.remote import RemoteRobot
-from hal.topics import APPLIED, SCAN
-from tools.bench import Row, echo, null_robot
-from tools.processes import ChildProcess, free_port
+from lira.hal.bus.attachment import Attachment
+from lira.hal.bus.bus import Bus
+from lira.hal.bus.topics import APPLIED, SCAN
+from lira.hal.client.remote import RemoteRobot
+from lira.hal.errors import BusError
+from lira.hal.messages import STOP, Command, LaserScan
+from lira.hal.messages.codec import encode
+from lira.tools.bench import Row, echo, null_robot
+from lira.tools.launch.processes import ChildProcess, free_port
 
 RUNS = 3
 SCANS = 150
@@ -42,12 +42,14 @@ def measure() -> dict[str, float]:
     """Measure the stack and the echo side by side."""
     port, echo_port = free_port(), free_port()
     name, endpoint, echo_endpoint = f"bench_{port}", f"127.0.0.1:{port}", f"127.0.0.1:{echo_port}"
-    python = [sys.executable, "-P", "-m"]
-    robot = [*python, "tools.bench.null_robot", name, endpoint, str(SCAN_HZ)]
+    python = [sys.executable, "-m"]
+    robot = [*python, "lira.tools.bench.null_robot", name, endpoint, str(SCAN_HZ)]
     with (
         TemporaryDirectory() as folder,
-        ChildProcess("the robot", robot, Path(folder) / "robot.log") as server,
-        ChildProcess("the echo", [*python, "tools.bench.echo", echo_endpoint], Path(folder) / "echo.log") as mirror,
+        ChildProcess("the robot", robot, Path(folder) / "lira.robot.log") as server,
+        ChildProcess(
+            "the echo", [*python, "lira.tools.bench.echo", echo_endpoint], Path(folder) / "echo.log"
+        ) as mirror,
     ):
         server.wait_ready(null_robot.READY, READY_S)
         mirror.wait_ready(echo.READY, READY_S)

@@ -16,20 +16,20 @@ from tempfile import TemporaryDirectory
 import msgspec
 import torch
 
-from fusion.control import ControlLoop
-from fusion.demonstrations import DemonstrationLog
-from fusion.journal import Journal
-from fusion.presets import METHODS
-from fusion.record import RunWriter
-from fusion.session import Apprentice
-from fusion.trainer import ProcessTrainer
-from hal.bus import Bus
-from hal.messages import Episode
-from hal.remote import RemoteArena, RemoteRobot
-from hal.topics import DECISION
-from tools.assembly import apprentice
-from tools.bench import Row
-from tools.processes import ChildProcess, free_port, lira_command
+from lira.fusion.control import ControlLoop
+from lira.fusion.learning.trainer import ProcessTrainer
+from lira.fusion.log.label_log import DemonstrationLog
+from lira.fusion.log.recorder import Journal
+from lira.fusion.log.run_log import RunWriter
+from lira.fusion.methods.presets import METHODS
+from lira.fusion.teaching.session import Apprentice
+from lira.hal.bus.bus import Bus
+from lira.hal.bus.topics import DECISION
+from lira.hal.client.remote import RemoteArena, RemoteRobot
+from lira.hal.messages import Episode
+from lira.tools.bench import Row
+from lira.tools.launch.processes import ChildProcess, free_port, lira_command
+from lira.tools.runs.build import apprentice
 
 RUNS = 3
 WORLD = "race"

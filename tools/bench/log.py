@@ -12,11 +12,11 @@ from tempfile import TemporaryDirectory
 import numpy as np
 import torch
 
-from fusion.demonstrations import Demonstration, DemonstrationLog, read_demonstrations
-from fusion.learner import Label, Learner
-from fusion.networks import CameraNet, FusionNet, LidarNet
-from hal.profile import load_profile
-from tools.bench import Row
+from lira.fusion.learning.learner import Label, Learner
+from lira.fusion.log.label_log import Demonstration, DemonstrationLog, read_demonstrations
+from lira.fusion.policies.networks import CameraNet, FusionNet, LidarNet
+from lira.hal.profile import load_profile
+from lira.tools.bench import Row
 
 LABELS = 1_000_000
 PROFILE = "thesis-sim"

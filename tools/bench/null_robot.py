@@ -1,15 +1,15 @@
-"""A HAL server in a process of its own with no robot behind it: `python -m tools.bench.null_robot NAME HOST:PORT`."""
+"""A HAL server as a process, with no robot behind it: `python -m lira.tools.bench.null_robot NAME HOST:PORT`."""
 
 import sys
 import time
 
 import msgspec
 
-from hal.bus import Bus
-from hal.governed import GovernedRobot
-from hal.null import NullRobot
-from hal.profile import RobotProfile, load_profile
-from hal.server import HalServer, stop_on_signal
+from lira.hal.bus.bus import Bus
+from lira.hal.profile import RobotProfile, load_profile
+from lira.hal.safety.governed import GovernedRobot
+from lira.hal.server.server import HalServer, stop_on_signal
+from lira.hal.testing import NullRobot
 
 READY = "null robot serves"
 

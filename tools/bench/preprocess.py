@@ -8,10 +8,10 @@ from collections.abc import Callable
 import cv2
 import numpy as np
 
-from fusion.preprocess import bin_scan, gray_image
-from hal.messages import CompressedImage, FloatArray, Image, LaserScan
-from hal.profile import load_profile
-from tools.bench import Row
+from lira.fusion.preprocess import bin_scan, gray_image
+from lira.hal.messages import CompressedImage, FloatArray, Image, LaserScan
+from lira.hal.profile import load_profile
+from lira.tools.bench import Row
 
 RUNS = 7
 REPEATS = 50

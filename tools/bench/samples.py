@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 
-from hal.messages import (
+from lira.hal.messages import (
     Applied,
     BatteryState,
     Bool,
@@ -31,7 +31,7 @@ from hal.messages import (
     Twist,
     TwistStamped,
 )
-from hal.outlet import compress
+from lira.hal.server.sensor_publisher import compress
 
 NAN, INF = math.nan, math.inf
 

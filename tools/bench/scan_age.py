@@ -12,15 +12,15 @@ from pathlib import Path
 
 import numpy as np
 
-from hal.bus import Bus
-from hal.profile import load_profile
-from hal.topics import SCAN
-from robot.rplidar.device import RPLidar
-from robot.rplidar.points import PARSERS, Parser, Points
-from robot.settings import LidarSettings
-from tools.bench import Row
-from tools.bench.devices import COUNT, FIRST_MM, MODES, Journal, devices
-from tools.processes import ChildProcess, free_port, lira_command
+from lira.hal.bus.bus import Bus
+from lira.hal.bus.topics import SCAN
+from lira.hal.profile import load_profile
+from lira.robot.rplidar.device import RPLidar
+from lira.robot.rplidar.points import PARSERS, Parser, Points
+from lira.robot.settings import LidarSettings
+from lira.tools.bench import Row
+from lira.tools.bench.devices import COUNT, FIRST_MM, MODES, Journal, devices
+from lira.tools.launch.processes import ChildProcess, free_port, lira_command
 
 RATE_HZ = 10.0  # of the emulated head
 SEAM_TURNS = 0.5  # behind the robot
@@ -44,7 +44,7 @@ def live(mode: str, seconds: float) -> Row:
         with devices(folder, mode) as there:
             words = ["--lidar", str(there.lidar), "--base", str(there.base), "--without", "camera"]
             words += ["--settings", str(folder / "quick.toml"), "--name", robot, "--listen", endpoint]
-            with ChildProcess("the robot", lira_command("robot", *words), folder / "robot.log") as child:
+            with ChildProcess("the robot", lira_command("robot", *words), folder / "lira.robot.log") as child:
                 child.wait_ready("serves", 60.0)
                 scans = listen(robot, endpoint, seconds)
             journal = there.stop()

@@ -16,15 +16,15 @@ from tempfile import TemporaryDirectory
 
 import msgspec
 
-from hal.bus import Bus
-from hal.errors import ConfigError
-from hal.estop import press_estop, release_estop
-from hal.messages import STOP, Episode, Source
-from hal.topics import APPLIED, RESET
-from tools.bench import Row, watcher
-from tools.processes import ChildProcess, free_port, lira_command
-from tools.stop_test import hand
-from tools.stop_test.control import tell
+from lira.hal.bus.bus import Bus
+from lira.hal.bus.topics import APPLIED, RESET
+from lira.hal.errors import ConfigError
+from lira.hal.messages import STOP, Episode, Source
+from lira.hal.server.estop_service import press_estop, release_estop
+from lira.tools.bench import Row, watcher
+from lira.tools.launch.processes import ChildProcess, free_port, lira_command
+from lira.tools.stop_test import hand
+from lira.tools.stop_test.control import tell
 
 MINUTES = 30.0
 READY_S = 60.0
@@ -126,7 +126,7 @@ def run(minutes: float = MINUTES) -> list[Row]:
             process.wait_ready(ready, READY_S)
             return Watched(what, process)
 
-        python = [sys.executable, "-P", "-m"]
+        python = [sys.executable, "-m"]
         there = ["--name", name, "--connect", endpoint]
         watched = [
             start("lira twin", lira_command("twin", "--name", name, "--listen", endpoint), "serves"),

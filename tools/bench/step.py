@@ -12,15 +12,15 @@ from typing import Any
 
 import msgspec
 
-from fusion import learner, novice
-from fusion.control import ControlLoop
-from fusion.lira import LiraSpf
-from fusion.preprocess import Preprocessor
-from fusion.presets import METHODS
-from fusion.teacher import ScriptedTeacher
-from sim_backend.twin import Twin
-from tools.bench import Row
-from tools.experiments.trial import Trial, play
+from lira.fusion.control import ControlLoop
+from lira.fusion.learning import learner, novice
+from lira.fusion.methods.lira import LiraSpf
+from lira.fusion.methods.presets import METHODS
+from lira.fusion.preprocess import Preprocessor
+from lira.fusion.teaching.teacher import ScriptedTeacher
+from lira.sim_backend.twin import Twin
+from lira.tools.bench import Row
+from lira.tools.experiments.trial import Trial, play
 
 SEED = 0
 LAPS = 12

@@ -18,19 +18,19 @@ from tempfile import TemporaryDirectory
 
 import numpy as np
 
-from hal.bus import Bus, Reader
-from hal.errors import BusError
-from hal.messages import HELD, STOP, Applied, Command, Source, Twist
-from hal.remote import RemoteRobot
-from hal.topics import APPLIED
-from tools.bench import Row, null_robot
-from tools.joystick.bridge import Bridge
-from tools.joystick.codes import AXES, BUTTONS, EV_ABS, EV_KEY, EV_SYN
-from tools.joystick.mapping import Mapping, load_mapping
-from tools.joystick.memory import PadMemory
-from tools.joystick.stick import AxisRange, PadEvent, PadState
-from tools.joystick.wheel import Wheel
-from tools.processes import ChildProcess, free_port
+from lira.hal.bus.bus import Bus, Reader
+from lira.hal.bus.topics import APPLIED
+from lira.hal.client.remote import RemoteRobot
+from lira.hal.errors import BusError
+from lira.hal.messages import HELD, STOP, Applied, Command, Source, Twist
+from lira.tools.bench import Row, null_robot
+from lira.tools.joystick.axes import AxisRange, PadEvent, PadState
+from lira.tools.joystick.bridge import Bridge
+from lira.tools.joystick.client import Wheel
+from lira.tools.joystick.codes import AXES, BUTTONS, EV_ABS, EV_KEY, EV_SYN
+from lira.tools.joystick.known_pads import PadMemory
+from lira.tools.joystick.mapping import Mapping, load_mapping
+from lira.tools.launch.processes import ChildProcess, free_port
 
 SAMPLES = 150
 WARM_UP = 5
@@ -82,8 +82,8 @@ def run() -> list[Row]:
     """Return one row."""
     port = free_port()
     name, endpoint = f"bench_{port}", f"127.0.0.1:{port}"
-    robot = [sys.executable, "-P", "-m", "tools.bench.null_robot", name, endpoint]
-    with TemporaryDirectory() as folder, ChildProcess("the robot", robot, Path(folder) / "robot.log") as server:
+    robot = [sys.executable, "-m", "lira.tools.bench.null_robot", name, endpoint]
+    with TemporaryDirectory() as folder, ChildProcess("the robot", robot, Path(folder) / "lira.robot.log") as server:
         server.wait_ready(null_robot.READY, READY_S)
         taken_ms = measure(name, endpoint)
     p50, p99 = (float(np.percentile(taken_ms, q)) for q in (50, 99))

@@ -7,10 +7,10 @@ import numpy as np
 import torch
 from torch import Tensor, nn
 
-from fusion.learner import Label, Learner
-from fusion.networks import CameraNet, FusionNet, LidarNet
-from fusion.trainer import ProcessTrainer
-from tools.bench import Row
+from lira.fusion.learning.learner import Label, Learner
+from lira.fusion.learning.trainer import ProcessTrainer
+from lira.fusion.policies.networks import CameraNet, FusionNet, LidarNet
+from lira.tools.bench import Row
 
 RUNS = 5
 LABELS = 300

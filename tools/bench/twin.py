@@ -8,12 +8,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from hal.messages import Command, Episode, Observation, Twist
-from hal.profile import RobotProfile, load_profile
-from sim_backend.lidar import RayLidar
-from sim_backend.sensors import open_camera
-from sim_backend.twin import Twin
-from tools.bench import Row
+from lira.hal.messages import Command, Episode, Observation, Twist
+from lira.hal.profile import RobotProfile, load_profile
+from lira.sim_backend.lidar import RayLidar
+from lira.sim_backend.sensors import open_camera
+from lira.sim_backend.twin import Twin
+from lira.tools.bench import Row
 
 WORLD = "race"
 RUNS = 7

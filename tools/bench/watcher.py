@@ -1,15 +1,15 @@
 """A console without a window: looks at everything on the bus as often as `lira console` draws.
 
-python -m tools.bench.watcher NAME HOST:PORT
+python -m lira.tools.bench.watcher NAME HOST:PORT
 """
 
 import sys
 import time
 
-from hal.bus import Bus
-from hal.desk import info_from_json
-from hal.topics import INFO
-from tools.console.listen import Ears
+from lira.hal.bus.bus import Bus
+from lira.hal.bus.topics import INFO
+from lira.hal.server.info_service import info_from_json
+from lira.tools.console.listen import Ears
 
 READY = "watching"
 LOOK_S = 0.05

@@ -4,9 +4,9 @@ import math
 
 import pygame
 
-from hal.messages import Action, ExpertView, LaserScan
-from tools.console.palette import AMBER, BACK, BLUE, DIM, EDGE, GREEN, PANEL, RED, SKY, TEXT, panel, write
-from tools.console.state import LOW_V, STALE_S, View, battery_share, driver_words, operator_words
+from lira.hal.messages import Action, ExpertView, LaserScan
+from lira.tools.console.palette import AMBER, BACK, BLUE, DIM, EDGE, GREEN, PANEL, RED, SKY, TEXT, panel, write
+from lira.tools.console.state import LOW_V, STALE_S, View, battery_share, driver_words, operator_words
 
 SIZE = (1280, 680)  # fits a screen of 1366 by 768 with a desktop's bar and a window's frame
 CALL_WORDS = {

@@ -5,9 +5,9 @@ It drives the same `Hand` as a pad, so it locks, gives back and stops in the sam
 
 from collections.abc import Set
 
-from tools.joystick.codes import AXES, BUTTONS
-from tools.joystick.mapping import Mapping, load_mapping
-from tools.joystick.stick import PadState
+from lira.tools.joystick.axes import PadState
+from lira.tools.joystick.codes import AXES, BUTTONS
+from lira.tools.joystick.mapping import Mapping, load_mapping
 
 KEYS = {
     "space": "BTN_TL",

@@ -8,11 +8,11 @@ from typing import TypeVar
 import cv2
 import numpy as np
 
-from hal.bus import Bus, Received
-from hal.messages import ByteArray, CompressedImage, Reason
-from hal.profile import RobotProfile
-from hal.topics import APPLIED, BATTERY, CAMERA, DECISION, ODOM, OPERATOR_ANSWER, SCAN
-from tools.console.state import View
+from lira.hal.bus.bus import Bus, Received
+from lira.hal.bus.topics import APPLIED, BATTERY, CAMERA, DECISION, ODOM, OPERATOR_ANSWER, SCAN
+from lira.hal.messages import ByteArray, CompressedImage, Reason
+from lira.hal.profile import RobotProfile
+from lira.tools.console.state import View
 
 M = TypeVar("M")
 

@@ -2,7 +2,7 @@
 
 import math
 
-from hal.messages import (
+from lira.hal.messages import (
     Applied,
     BatteryState,
     Decision,
@@ -15,16 +15,16 @@ from hal.messages import (
     Source,
     Twist,
 )
-from hal.profile import load_profile
-from tools.console.state import View
+from lira.hal.profile import load_profile
+from lira.tools.console.state import View
 
 START_M = 14.0
 
 
 def sample_view() -> View:
     """A robot on a line with boxes, at a moment when its experts disagree."""
-    from sim_backend.catalogue import load_world
-    from sim_backend.twin import Twin
+    from lira.sim_backend.catalogue import load_world
+    from lira.sim_backend.twin import Twin
 
     profile = load_profile("thesis-sim")
     twin = Twin(profile, load_world("line-obstacles"), renderer="tiny")

@@ -2,7 +2,8 @@
 
 from dataclasses import dataclass, field
 
-from hal.messages import (
+from lira.hal.bus.topics import OPERATOR_ANSWER
+from lira.hal.messages import (
     Applied,
     BatteryState,
     ByteArray,
@@ -12,8 +13,7 @@ from hal.messages import (
     OperatorAnswer,
     Request,
 )
-from hal.topics import OPERATOR_ANSWER
-from tools.joystick.hand import State
+from lira.tools.joystick.deadman import State
 
 STALE_S = 1.0
 EMPTY_V, LOW_V, FULL_V = 10.2, 10.8, 12.6  # three lithium cells

@@ -8,16 +8,16 @@ from dataclasses import replace
 
 import pygame
 
-from hal.errors import StorageError
-from hal.messages import Request
-from tools.console import sound
-from tools.console.draw import SIZE, draw
-from tools.console.keyboard import keyboard_mapping, pad_of
-from tools.console.state import View
-from tools.joystick.hand import Hand, State
-from tools.joystick.requests import RequestButtons
-from tools.joystick.stick import PadState
-from tools.joystick.wheel import Wheel
+from lira.hal.errors import StorageError
+from lira.hal.messages import Request
+from lira.tools.console import sound
+from lira.tools.console.draw import SIZE, draw
+from lira.tools.console.keyboard import keyboard_mapping, pad_of
+from lira.tools.console.state import View
+from lira.tools.joystick.axes import PadState
+from lira.tools.joystick.client import Wheel
+from lira.tools.joystick.deadman import Hand, State
+from lira.tools.joystick.requests import RequestButtons
 
 FPS = 30.0
 KEYS = {

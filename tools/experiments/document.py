@@ -3,12 +3,12 @@
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
-from hal.config import load_toml, write_whole
-from hal.errors import ConfigError, StorageError
-from tools.bench import cell, columns
-from tools.experiments.experiment import Finding, Row
-from tools.experiments.fingerprint import ROOT
-from tools.experiments.summary import Summary
+from lira.hal.config import load_toml, write_whole
+from lira.hal.errors import ConfigError, StorageError
+from lira.tools.bench import cell, columns
+from lira.tools.experiments.experiment import Finding, Row
+from lira.tools.experiments.fingerprint import ROOT
+from lira.tools.experiments.summary import Summary
 
 SUMMARIES = ROOT / "tools" / "experiments" / "results"
 CAUSES = ROOT / "tools" / "experiments" / "causes.toml"

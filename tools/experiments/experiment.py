@@ -7,7 +7,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from tools.experiments.trial import Outcome, Trial
+from lira.tools.experiments.trial import Outcome, Trial
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -7,25 +7,25 @@ from pathlib import Path
 
 import msgspec
 
-from fusion.expert_files import SHIPPED, expert_path
-from fusion.tasks import TASKS, task_of
-from hal.profile import load_profile
-from sim_backend.catalogue import load_world
+import lira
+from lira.fusion.experts.files import SHIPPED, expert_path
+from lira.fusion.experts.tasks import TASKS, task_of
+from lira.hal.profile import load_profile
+from lira.sim_backend.catalogue import load_world
 
-ROOT = Path(__file__).parents[2]
-START = "tools.experiments.trial"
-OURS = ("hal", "fusion", "sim_backend", "tools")
+ROOT = Path(lira.__file__).parent
+START = "lira.tools.experiments.trial"
 
 
 @cache
 def fingerprint(world: str, pair: str) -> str:
     """Return 16 hex digits that change with anything a trial here, with these experts, could come out differently for.
 
-    Of the code, what `START` imports counts, without comments and docstrings; the robot is that of the world's task.
-    Raises `ConfigError` for an expert that is not there.
+    Of the code, what `START` imports counts: what each file does, not where it lies nor what it imports, so that moving
+    modules changes nothing. The robot is that of the world's task. Raises `ConfigError` if an expert is not there.
     """
     profile = load_profile(TASKS[task_of(world)].profile)
-    parts = [code(path) for path in sources(START)]
+    parts = sorted(filter(None, (code(path) for path in sources(START))))
     parts += [msgspec.json.encode(each) for each in (load_world(world), profile)]
     parts += [expert_path(name, profile, pair).read_bytes() for name in SHIPPED]
     return hashlib.sha256(b"".join(hashlib.sha256(part).digest() for part in parts)).hexdigest()[:16]
@@ -47,9 +47,10 @@ def sources(start: str) -> list[Path]:
 
 def module_file(name: str) -> Path | None:
     """Where a module of ours lies; None for what is none."""
-    if name.split(".")[0] not in OURS:
+    top, *rest = name.split(".")
+    if top != lira.__name__:
         return None
-    path = ROOT.joinpath(*name.split("."))
+    path = ROOT.joinpath(*rest)
     return next((each for each in (path.with_suffix(".py"), path / "__init__.py") if each.is_file()), None)
 
 
@@ -65,12 +66,13 @@ def imported(path: Path) -> list[str]:
 
 
 def code(path: Path) -> bytes:
-    """Return what a file does: its syntax tree without docstrings."""
+    """Return what a file does: its syntax tree without docstrings and imports; nothing if it does nothing else."""
     tree = _tree(path)
     for node in ast.walk(tree):
-        if isinstance(node, ast.Module | ast.ClassDef | ast.FunctionDef) and ast.get_docstring(node) is not None:
-            node.body = node.body[1:]
-    return ast.dump(tree).encode()
+        if isinstance(node, ast.Module | ast.ClassDef | ast.FunctionDef):
+            body = node.body[1:] if ast.get_docstring(node) is not None else node.body
+            node.body = [each for each in body if not isinstance(each, ast.Import | ast.ImportFrom)]
+    return ast.dump(tree).encode() if tree.body else b""
 
 
 def _tree(path: Path) -> ast.Module:

@@ -4,9 +4,9 @@ from pathlib import Path
 
 import msgspec
 
-from hal.config import load_json, write_whole
-from hal.errors import ConfigError, StorageError
-from tools.experiments.trial import Outcome, Trial
+from lira.hal.config import load_json, write_whole
+from lira.hal.errors import ConfigError, StorageError
+from lira.tools.experiments.trial import Outcome, Trial
 
 MOST_BYTES = 2**28  # an outcome holds the way of the robot
 

@@ -5,12 +5,12 @@ from functools import cache
 
 import numpy as np
 
-from fusion.record import LapRecord
-from fusion.tasks import TASKS, task_of
-from hal.profile import load_profile
-from tools.experiments.experiment import Outcomes, Row
-from tools.experiments.statistics import iqm
-from tools.experiments.trial import Outcome
+from lira.fusion.experts.tasks import TASKS, task_of
+from lira.fusion.log.run_log import LapRecord
+from lira.hal.profile import load_profile
+from lira.tools.experiments.experiment import Outcomes, Row
+from lira.tools.experiments.statistics import iqm
+from lira.tools.experiments.trial import Outcome
 
 
 def grouped(outcomes: Outcomes, key: Callable[[Outcome], str]) -> dict[str, list[Outcome]]:
@@ -123,8 +123,8 @@ def experts_share(counts: dict[str, int]) -> int:
 @cache
 def expert_labels(task: str) -> dict[str, int]:
     """Labels that trained each expert of a task, from its file; an expert of an older version counts nothing."""
-    from fusion.expert_files import SHIPPED
-    from fusion.experts import load_network
+    from lira.fusion.experts.files import SHIPPED
+    from lira.fusion.experts.load import load_network
 
     profile = load_profile(TASKS[task].profile)
     return {name: load_network(f"{name}-expert", profile, task)[1].labels or 0 for name in SHIPPED}

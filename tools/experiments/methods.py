@@ -5,8 +5,8 @@ Here all are taught and proven on one layout, as in the thesis, also those that 
 
 from msgspec.structs import replace
 
-from fusion.presets import METHODS, Method
-from fusion.syllabus import THESIS
+from lira.fusion.methods.presets import METHODS, Method
+from lira.fusion.methods.syllabus import THESIS
 
 
 def as_in_the_thesis(name: str) -> Method:

@@ -5,10 +5,10 @@ from typing import Self
 
 import msgspec
 
-from fusion.demonstrations import Demonstration
-from fusion.ledger import DEMONSTRATION
-from fusion.record import LapRecord, Record, StepRecord
-from hal.messages import Action
+from lira.fusion.log.counts import DEMONSTRATION
+from lira.fusion.log.label_log import Demonstration
+from lira.fusion.log.run_log import LapRecord, Record, StepRecord
+from lira.hal.messages import Action
 
 
 class Track(msgspec.Struct, frozen=True):

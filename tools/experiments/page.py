@@ -9,11 +9,11 @@ from pathlib import Path
 
 import matplotlib as mpl
 
-from hal.errors import StorageError
-from tools.bench import cell, columns
-from tools.experiments.experiment import Finding, Picture, Row
-from tools.experiments.summary import Summary
-from tools.report.page import section
+from lira.hal.errors import StorageError
+from lira.tools.bench import cell, columns
+from lira.tools.experiments.experiment import Finding, Picture, Row
+from lira.tools.experiments.summary import Summary
+from lira.tools.report.page import section
 
 mpl.rcParams["svg.hashsalt"] = "lira"  # the same data, the same file
 
@@ -58,7 +58,7 @@ def document(summary: Summary, figures: Sequence[str]) -> str:
     """Return the whole page."""
     name = summary.name
     facts = f"{summary.command}: {summary.trials} trials"
-    style = (resources.files("tools") / "report" / "page.css").read_text(encoding="utf-8")
+    style = (resources.files("lira.tools") / "report" / "page.css").read_text(encoding="utf-8")
     parts = [f'<h1>{escape(name)}: {escape(summary.words)}</h1><p class="muted">{escape(facts)}</p>']
     parts += [section(table.title, table.note, html_table(table.rows)) for table in summary.tables]
     if summary.findings:

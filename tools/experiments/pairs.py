@@ -2,9 +2,9 @@
 
 from collections.abc import Iterable, Mapping, Sequence
 
-from tools.experiments.experiment import Row
-from tools.experiments.statistics import median_interval, paired_ratios
-from tools.experiments.trial import Outcome
+from lira.tools.experiments.experiment import Row
+from lira.tools.experiments.statistics import median_interval, paired_ratios
+from lira.tools.experiments.trial import Outcome
 
 TOTAL = "human_labels and demonstration"
 

@@ -3,13 +3,13 @@
 from collections.abc import Mapping, Sequence
 from functools import partial
 
-from tools.experiments.experiment import Picture
-from tools.experiments.trial import Outcome
+from lira.tools.experiments.experiment import Picture
+from lira.tools.experiments.trial import Outcome
 
 
 def box_pictures(groups: Mapping[str, Sequence[Outcome]], quantities: Sequence[str]) -> list[Picture]:
     """One box plot per quantity of the results, a box per group."""
-    from tools.experiments import plots
+    from lira.tools.experiments import plots
 
     cut = {name: [not each.result.converged for each in group] for name, group in groups.items()}
     return [

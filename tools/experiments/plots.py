@@ -7,11 +7,11 @@ from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
 
-from hal.messages import Action
-from tools.experiments.experiment import Row
-from tools.experiments.notes import Track
-from tools.report.course import course
-from tools.report.plots import BINS, PUT_BACK_M
+from lira.hal.messages import Action
+from lira.tools.experiments.experiment import Row
+from lira.tools.experiments.notes import Track
+from lira.tools.report.course import course
+from lira.tools.report.plots import BINS, PUT_BACK_M
 
 # Okabe and Ito: told apart by people with any colour vision.
 COLOURS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#8a6d00", "#626b75")

@@ -4,9 +4,9 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from hal.errors import ConfigError
-from tools.experiments.fingerprint import fingerprint
-from tools.experiments.trial import Outcome, Trial, play
+from lira.hal.errors import ConfigError
+from lira.tools.experiments.fingerprint import fingerprint
+from lira.tools.experiments.trial import Outcome, Trial, play
 
 if TYPE_CHECKING:
     from distributed import Client

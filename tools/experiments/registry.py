@@ -4,7 +4,7 @@ import importlib
 from typing import TYPE_CHECKING, NamedTuple
 
 if TYPE_CHECKING:
-    from tools.experiments.experiment import Experiment
+    from lira.tools.experiments.experiment import Experiment
 
 
 class Entry(NamedTuple):
@@ -36,6 +36,6 @@ REGISTRY = {
 
 def load(name: str) -> "Experiment":
     """Import an experiment. Raises `KeyError` for a name that is not in the registry."""
-    module = importlib.import_module(f"tools.experiments.{REGISTRY[name].module}")
+    module = importlib.import_module(f"lira.tools.experiments.studies.{REGISTRY[name].module}")
     experiment: Experiment = module.EXPERIMENTS[name]
     return experiment

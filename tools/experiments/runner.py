@@ -9,9 +9,9 @@ from typing import Self
 import msgspec
 from tqdm import tqdm
 
-from tools.experiments.fingerprint import fingerprint
-from tools.experiments.kept import keep, kept
-from tools.experiments.trial import Outcome, Trial
+from lira.tools.experiments.fingerprint import fingerprint
+from lira.tools.experiments.kept import keep, kept
+from lira.tools.experiments.trial import Outcome, Trial
 
 Pool = Callable[[Sequence[Trial]], Iterator[Outcome]]
 """Plays trials and yields what came of them, in whatever order they end."""

@@ -5,9 +5,9 @@ from pathlib import Path
 
 import msgspec
 
-from hal.config import load_json, write_whole
-from hal.errors import ConfigError, StorageError
-from tools.experiments.experiment import Experiment, Finding, Outcomes, Row, Table
+from lira.hal.config import load_json, write_whole
+from lira.hal.errors import ConfigError, StorageError
+from lira.tools.experiments.experiment import Experiment, Finding, Outcomes, Row, Table
 
 MOST_BYTES = 2**24
 

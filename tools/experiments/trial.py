@@ -6,22 +6,22 @@ from pathlib import Path
 
 import msgspec
 
-from fusion.control import ControlLoop
-from fusion.journal import Journal
-from fusion.presets import Method as Method
-from fusion.record import LapRecord, ResultRecord
-from fusion.session import Session
-from fusion.tasks import TASKS, task_of
-from fusion.teacher import SKILLED, TeacherSettings
-from fusion.trainer import InlineTrainer
-from hal.governed import GovernedRobot
-from hal.messages import Action
-from hal.profile import RobotProfile, load_profile
-from sim_backend.catalogue import load_world
-from sim_backend.foresight import sketching
-from sim_backend.twin import Twin
-from tools.assembly import Course, crew, teacher
-from tools.experiments.notes import Notes, Track
+from lira.fusion.control import ControlLoop
+from lira.fusion.experts.tasks import TASKS, task_of
+from lira.fusion.learning.trainer import InlineTrainer
+from lira.fusion.log.recorder import Journal
+from lira.fusion.log.run_log import LapRecord, ResultRecord
+from lira.fusion.methods.presets import Method as Method
+from lira.fusion.teaching.session import Session
+from lira.fusion.teaching.teacher import SKILLED, TeacherSettings
+from lira.hal.messages import Action
+from lira.hal.profile import RobotProfile, load_profile
+from lira.hal.safety.governed import GovernedRobot
+from lira.sim_backend.catalogue import load_world
+from lira.sim_backend.foresight import sketching
+from lira.sim_backend.twin import Twin
+from lira.tools.experiments.notes import Notes, Track
+from lira.tools.runs.build import Course, crew, teacher
 
 UNSEEN = 1000  # layouts from here on belong to nobody's training
 

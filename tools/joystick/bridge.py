@@ -6,16 +6,16 @@ import time
 from collections.abc import Callable
 from typing import Protocol
 
-from hal.errors import DeviceError
-from hal.messages import Applied, Reason
-from tools.joystick.freeze import FreezeWatch
-from tools.joystick.hand import Hand, Order, State
-from tools.joystick.mapping import Mapping
-from tools.joystick.memory import PadMemory
-from tools.joystick.requests import RequestButtons
-from tools.joystick.rumble import CALLS, TAKEN, Rumble, pattern_of
-from tools.joystick.stick import PadState
-from tools.joystick.wheel import Wheel
+from lira.hal.errors import DeviceError
+from lira.hal.messages import Applied, Reason
+from lira.tools.joystick.axes import PadState
+from lira.tools.joystick.client import Wheel
+from lira.tools.joystick.deadman import Hand, Order, State
+from lira.tools.joystick.freeze import FreezeWatch
+from lira.tools.joystick.known_pads import PadMemory
+from lira.tools.joystick.mapping import Mapping
+from lira.tools.joystick.requests import RequestButtons
+from lira.tools.joystick.rumble import CALLS, TAKEN, Rumble, pattern_of
 
 RATE_HZ = 30.0
 SEARCH_S = 0.3

@@ -6,9 +6,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from hal.errors import DeviceError
-from tools.joystick.codes import INPUT_PROP_ACCELEROMETER
-from tools.joystick.mapping import Mapping
+from lira.hal.errors import DeviceError
+from lira.tools.joystick.codes import INPUT_PROP_ACCELEROMETER
+from lira.tools.joystick.mapping import Mapping
 
 SYS_INPUT = Path("/sys/class/input")
 WORD_BITS = 8 * struct.calcsize("l")

@@ -8,11 +8,11 @@ from typing import Any
 import evdev
 from evdev import ecodes, ff
 
-from hal.errors import DeviceError
-from tools.joystick.codes import EV_SYN, SYN_DROPPED, SYN_REPORT
-from tools.joystick.mapping import Mapping
-from tools.joystick.nodes import Node, choose, motion_of, read_nodes
-from tools.joystick.stick import AxisRange, PadEvent, PadState
+from lira.hal.errors import DeviceError
+from lira.tools.joystick.axes import AxisRange, PadEvent, PadState
+from lira.tools.joystick.codes import EV_SYN, SYN_DROPPED, SYN_REPORT
+from lira.tools.joystick.mapping import Mapping
+from lira.tools.joystick.nodes import Node, choose, motion_of, read_nodes
 
 LONGEST_RUMBLE_MS = 1000  # the kernel ends an effect by itself if we do not live to do so
 FULL = 0xFFFF

@@ -3,9 +3,9 @@
 import math
 from collections.abc import Iterator, Sequence
 
-from hal.messages import OperatorRequest, Request
-from tools.joystick.mapping import Mapping
-from tools.joystick.stick import PadState
+from lira.hal.messages import OperatorRequest, Request
+from lira.tools.joystick.axes import PadState
+from lira.tools.joystick.mapping import Mapping
 
 HOLD_S = 1.0  # so long for what cannot be taken back
 

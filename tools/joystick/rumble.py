@@ -1,6 +1,6 @@
 """What calls feel like. Pure: a pattern is a list of (strength, seconds), strength in [0, 1]."""
 
-from hal.messages import JoyFeedback
+from lira.hal.messages import JoyFeedback
 
 Pattern = tuple[tuple[float, float], ...]
 

@@ -7,9 +7,9 @@ from functools import partial
 import msgspec
 import numpy as np
 
-from hal.messages import STOP
-from tools.parity import motion, sight
-from tools.parity.record import Recording
+from lira.hal.messages import STOP
+from lira.tools.parity import motion, sight
+from lira.tools.parity.record import Recording
 
 SAME, DIFFERS, MISSING = "same", "differs", "missing"
 LATE = 99.0  # percentile that stands for "at worst"

@@ -5,9 +5,9 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from hal.messages import Odometry
-from tools.parity.record import Recording, Span
-from tools.parity.script import SETTLED_S
+from lira.hal.messages import Odometry
+from lira.tools.parity.record import Recording, Span
+from lira.tools.parity.script import SETTLED_S
 
 Floats = NDArray[np.float64]
 

@@ -9,10 +9,10 @@ from importlib import resources
 import cv2
 import numpy as np
 
-from tools.parity.compare import DIFFERS, Row, cells
-from tools.parity.record import Recording
-from tools.parity.sight import still_image, still_scan
-from tools.report.svg import Point, dots, drawing, path, polyline, text
+from lira.tools.parity.compare import DIFFERS, Row, cells
+from lira.tools.parity.record import Recording
+from lira.tools.parity.sight import still_image, still_scan
+from lira.tools.report.svg import Point, dots, drawing, path, polyline, text
 
 COLUMNS = ("", "unit", "first", "second", "difference", "allowed", "verdict")
 STYLES = ("novice", "human")  # of the first and the second robot: colours of the report's style sheet
@@ -26,7 +26,7 @@ def render(first: Recording, second: Recording, rows: Sequence[Row]) -> str:
     """Return the whole page."""
     pair = (first, second)
     title = f"{first.name} and {second.name}"
-    style = (resources.files("tools") / "report" / "page.css").read_text(encoding="utf-8")
+    style = (resources.files("lira.tools") / "report" / "page.css").read_text(encoding="utf-8")
     apart = [row.name for row in rows if row.verdict == DIFFERS]
     outcome = "No difference beyond what is allowed" if not apart else f"{len(apart)} of {len(rows)} lines differ"
     keys = "".join(

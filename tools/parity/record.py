@@ -4,16 +4,16 @@ import time
 from dataclasses import dataclass, field
 from typing import Any, Generic, TypeVar
 
-from hal.bus import Bus, Reader
-from hal.clock import ClockEstimate
-from hal.desk import LOCKSTEP, info_from_json
-from hal.errors import BusError, ConfigError
-from hal.lease import session_of
-from hal.messages import STOP, Applied, CompressedImage, Imu, LaserScan, Odometry, Reason, Source
-from hal.profile import RobotProfile
-from hal.senses import Stamped
-from hal.topics import APPLIED, CAMERA, CMD_VEL, IMU, INFO, ODOM, SCAN
-from tools.parity.script import Phase, motions
+from lira.hal.bus.bus import Bus, Reader
+from lira.hal.bus.clock import ClockEstimate
+from lira.hal.bus.topics import APPLIED, CAMERA, CMD_VEL, IMU, INFO, ODOM, SCAN
+from lira.hal.client.sensor_reader import Stamped
+from lira.hal.errors import BusError, ConfigError
+from lira.hal.messages import STOP, Applied, CompressedImage, Imu, LaserScan, Odometry, Reason, Source
+from lira.hal.profile import RobotProfile
+from lira.hal.safety.lease import session_of
+from lira.hal.server.info_service import LOCKSTEP, info_from_json
+from lira.tools.parity.script import Phase, motions
 
 S = TypeVar("S", bound=Stamped)
 

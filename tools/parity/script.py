@@ -2,8 +2,8 @@
 
 from dataclasses import dataclass
 
-from hal.messages import STOP, Twist
-from hal.profile import Base
+from lira.hal.messages import STOP, Twist
+from lira.hal.profile import Base
 
 STAND_S = 3.0  # both robots see the same then, if they stand in the same place
 STEP_S = 2.0

@@ -6,10 +6,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from fusion.preprocess import gray_image
-from hal.messages import FloatArray, LaserScan
-from hal.ranges import read_ranges
-from tools.parity.record import Recording
+from lira.fusion.preprocess import gray_image
+from lira.hal.messages import FloatArray, LaserScan
+from lira.hal.messages.ranges import read_ranges
+from lira.tools.parity.record import Recording
 
 Floats = NDArray[np.float64]
 

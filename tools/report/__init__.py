@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from hal.config import write_whole
+from lira.hal.config import write_whole
 
 RECORD = "run.jsonl"
 PAGE = "report.html"
@@ -13,8 +13,8 @@ def write_report(folder: Path) -> Path:
 
     Raises `StorageError` if there is no usable record, or the page cannot be written.
     """
-    from tools.report.digest import load_run
-    from tools.report.page import render
+    from lira.tools.report.digest import load_run
+    from lira.tools.report.page import render
 
     page = folder / PAGE
     write_whole(page, render(load_run(folder / RECORD)).encode())

@@ -4,11 +4,11 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import lru_cache
 
-from hal.errors import ConfigError
-from sim_backend.catalogue import load_world
-from sim_backend.layout import Block, Mark, build, outline
-from sim_backend.polyline import Floats
-from tools.report.svg import Point
+from lira.hal.errors import ConfigError
+from lira.sim_backend.catalogue import load_world
+from lira.sim_backend.layout import Block, Mark, build, outline
+from lira.sim_backend.polyline import Floats
+from lira.tools.report.svg import Point
 
 Outlines = tuple[tuple[Point, ...], ...]
 

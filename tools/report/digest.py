@@ -4,9 +4,9 @@ from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from fusion.record import LapRecord, Record, ResultRecord, RunRecord, StepRecord, read_run
-from hal.errors import StorageError
-from hal.messages import Action
+from lira.fusion.log.run_log import LapRecord, Record, ResultRecord, RunRecord, StepRecord, read_run
+from lira.hal.errors import StorageError
+from lira.hal.messages import Action
 
 PHASES = {"train": "Training lap", "prove": "Proving run", "unseen": "Unseen layout"}
 

@@ -1,6 +1,6 @@
 """The table of laps, the same on the page and in the terminal."""
 
-from tools.report.digest import Lap
+from lira.tools.report.digest import Lap
 
 COLUMNS = (
     *("lap", "layout", "passed", "without human", "time", "collisions", "line lost", "off line, rms"),

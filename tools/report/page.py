@@ -9,11 +9,11 @@ from importlib import resources
 import cv2
 import numpy as np
 
-from tools.proven import proof_words, unseen_words
-from tools.report import plots
-from tools.report.course import course
-from tools.report.digest import Lap, Run
-from tools.report.laps import COLUMNS, clock, lap_cells
+from lira.tools.output.proven import proof_words, unseen_words
+from lira.tools.report import plots
+from lira.tools.report.course import course
+from lira.tools.report.digest import Lap, Run
+from lira.tools.report.laps import COLUMNS, clock, lap_cells
 
 TRAINING_VIEWS = 6
 PICTURES = 24
@@ -22,7 +22,7 @@ PICTURES = 24
 def render(run: Run) -> str:
     """Return the whole page."""
     title = f"{method_name(run)} on {run.head.world}" if run.head else "A run"
-    style = (resources.files("tools") / "report" / "page.css").read_text(encoding="utf-8")
+    style = (resources.files("lira.tools") / "report" / "page.css").read_text(encoding="utf-8")
     sections = [head(run, title), lap_table(run), top_views(run), strips(run), densities(run), pictures(run)]
     return (
         '<!doctype html>\n<html lang="en"><head><meta charset="utf-8">'

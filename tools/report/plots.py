@@ -5,10 +5,10 @@ from collections import defaultdict
 from collections.abc import Sequence
 from itertools import pairwise
 
-from hal.messages import Action
-from tools.report.course import Course
-from tools.report.digest import Lap
-from tools.report.svg import Point, bars, dots, drawing, number, path, polyline, text
+from lira.hal.messages import Action
+from lira.tools.report.course import Course
+from lira.tools.report.digest import Lap
+from lira.tools.report.svg import Point, bars, dots, drawing, number, path, polyline, text
 
 MARGIN_M = 0.6
 PUT_BACK_M = 0.6  # farther than any robot here moves within one decision: it was put down anew

@@ -7,12 +7,12 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Protocol
 
-from hal.bus import Bus
-from hal.errors import LiraError
-from hal.estop import press_estop, release_estop
-from tools.processes import ChildProcess
-from tools.relay import LinkFaults, Relay
-from tools.stop_test.intruder import Intruder
+from lira.hal.bus.bus import Bus
+from lira.hal.errors import LiraError
+from lira.hal.server.estop_service import press_estop, release_estop
+from lira.tools.launch.link_fault import LinkFaults, Relay
+from lira.tools.launch.processes import ChildProcess
+from lira.tools.stop_test.intruder import Intruder
 
 LEASE_GONE_S = 1.2
 HOUR_S = 3600

@@ -3,10 +3,10 @@
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
-from tools.stop_test.matrix import Matrix
-from tools.stop_test.mutants import Mutant
-from tools.stop_test.rows import ROWS, Row
-from tools.stop_test.verdict import Result
+from lira.tools.stop_test.matrix import Matrix
+from lira.tools.stop_test.mutants import Mutant
+from lira.tools.stop_test.rows import ROWS, Row
+from lira.tools.stop_test.verdict import Result
 
 
 def cull(

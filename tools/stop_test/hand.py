@@ -2,22 +2,22 @@
 
 Control messages: `go` grips and pushes the stick as far as it goes; `leave` lets go.
 
-python -m tools.stop_test.hand NAME HOST:PORT CONTROL_PORT
+python -m lira.tools.stop_test.hand NAME HOST:PORT CONTROL_PORT
 """
 
 import sys
 import threading
 import time
 
-from hal.bus import Bus
-from hal.topics import INFO
-from tools.bench.takeover import PipePad
-from tools.joystick.bridge import Bridge
-from tools.joystick.codes import AXES, BUTTONS, EV_ABS, EV_KEY
-from tools.joystick.mapping import load_mapping
-from tools.joystick.memory import PadMemory
-from tools.joystick.wheel import Wheel
-from tools.stop_test.control import listen
+from lira.hal.bus.bus import Bus
+from lira.hal.bus.topics import INFO
+from lira.tools.bench.takeover import PipePad
+from lira.tools.joystick.bridge import Bridge
+from lira.tools.joystick.client import Wheel
+from lira.tools.joystick.codes import AXES, BUTTONS, EV_ABS, EV_KEY
+from lira.tools.joystick.known_pads import PadMemory
+from lira.tools.joystick.mapping import load_mapping
+from lira.tools.stop_test.control import listen
 
 READY = "a hand by word"
 ANSWER_S = 5.0

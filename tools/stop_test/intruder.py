@@ -13,19 +13,19 @@ from typing import TYPE_CHECKING
 
 import zenoh
 
-from hal.attachment import Attachment
-from hal.bus import Bus, Received
-from hal.codec import encode
-from hal.errors import BusError
-from hal.estop import look_at_estop, release_estop
-from hal.keys import load_keys
-from hal.messages import STOP, Applied, Twist
-from hal.topics import APPLIED, CMD_VEL, TELEOP
-from tools.stop_test import flood
-from tools.stop_test.sender import Pen
+from lira.hal.bus.attachment import Attachment
+from lira.hal.bus.bus import Bus, Received
+from lira.hal.bus.keys import load_keys
+from lira.hal.bus.topics import APPLIED, CMD_VEL, TELEOP
+from lira.hal.errors import BusError
+from lira.hal.messages import STOP, Applied, Twist
+from lira.hal.messages.codec import encode
+from lira.hal.server.estop_service import look_at_estop, release_estop
+from lira.tools.stop_test import flood
+from lira.tools.stop_test.sender import Pen
 
 if TYPE_CHECKING:
-    from tools.stop_test.keyring import Keyring
+    from lira.tools.stop_test.keyring import Keyring
 
 TIMES = 15
 PAUSE_S = 0.02
@@ -110,7 +110,7 @@ class Intruder:
     def flood(self, kind: str) -> None:
         """Send as much as fits through from now on, from two more processes."""
         endpoint, robot = self._bus.endpoint, self._bus.robot
-        command = [sys.executable, "-P", "-m", flood.__name__, endpoint, robot, kind]
+        command = [sys.executable, "-m", flood.__name__, endpoint, robot, kind]
         for _ in range(2):
             self._floods.append(subprocess.Popen(command, stdout=subprocess.PIPE, start_new_session=True))
         for process in self._floods:

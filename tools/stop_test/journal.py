@@ -10,7 +10,7 @@ import threading
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from hal.messages import Reason
+from lira.hal.messages import Reason
 
 SUFFIX = ".bin"
 _LAYOUT = struct.Struct("<Bdddd")

@@ -10,11 +10,11 @@ from cryptography.hazmat.primitives import hashes
 from cryptography.hazmat.primitives.asymmetric import ec
 from cryptography.hazmat.primitives.serialization import Encoding, load_pem_private_key
 
-from hal.keys import CERTIFICATE, KEY
-from tools.authority import AUTHORITY
-from tools.processes import lira_command
-from tools.stop_test.acts import StopTestError
-from tools.stop_test.setups import BRIEF, GUEST, LEAVER
+from lira.hal.bus.keys import CERTIFICATE, KEY
+from lira.tools.authority import AUTHORITY
+from lira.tools.launch.processes import lira_command
+from lira.tools.stop_test.acts import StopTestError
+from lira.tools.stop_test.setups import BRIEF, GUEST, LEAVER
 
 BRIEF_S, PATIENCE_S = 10.0, 20.0
 

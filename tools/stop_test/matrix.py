@@ -9,13 +9,13 @@ from dataclasses import replace
 from itertools import count, groupby
 from pathlib import Path
 
-from hal.errors import LiraError
-from tools.stop_test.acts import StopTestError
-from tools.stop_test.bench import SETTLE_S, ProcessBench, open_bench
-from tools.stop_test.mutants import Mutant
-from tools.stop_test.rows import Row
-from tools.stop_test.setups import Setup, clock_library
-from tools.stop_test.verdict import ASKED, Bounds, Result, Rules, Verdict, judge, summarize, within
+from lira.hal.errors import LiraError
+from lira.tools.stop_test.acts import StopTestError
+from lira.tools.stop_test.mutants import Mutant
+from lira.tools.stop_test.rows import Row
+from lira.tools.stop_test.setups import Setup, clock_library
+from lira.tools.stop_test.testbed import SETTLE_S, ProcessBench, open_bench
+from lira.tools.stop_test.verdict import ASKED, Bounds, Result, Rules, Verdict, judge, summarize, within
 
 ATTEMPTS = 5
 REPEATS, STALL_S = 2, 0.06

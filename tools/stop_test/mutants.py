@@ -11,8 +11,8 @@ from dataclasses import dataclass, replace
 from importlib import import_module
 from typing import Any
 
-from hal.errors import LiraError
-from hal.messages import Reason, Source
+from lira.hal.errors import LiraError
+from lira.hal.messages import Reason, Source
 
 FOREVER_S = 1e9
 PATIENT_S = 2.0
@@ -70,7 +70,7 @@ def rewrite(*changes: tuple[str, str, str]) -> Callable[[], None]:
     """Change the governor's table: in this state, this event leads to that state, and motion is allowed there."""
 
     def break_() -> None:
-        governor = import_module("hal.governor")
+        governor = import_module("lira.hal.safety.governor")
         table = governor.TRANSITIONS
         keys = {(str(state), str(event)): (state, event) for state, event in table}
         for state, event, then in changes:
@@ -85,7 +85,7 @@ def without_objection(*reasons: str) -> Callable[[], None]:
     """Refuse no command for these reasons."""
 
     def break_() -> None:
-        from hal.governor import Governor
+        from lira.hal.safety.governor import Governor
 
         after(Governor, "_objection", lambda objection, *_: None if objection in reasons else objection)
 
@@ -103,7 +103,7 @@ def constant(module: str, name: str, value: float) -> Callable[[], None]:
 
 def obey_by_arrival() -> None:
     """Take every command for as young as its arrival."""
-    from hal.governor import Governor
+    from lira.hal.safety.governor import Governor
 
     old = swap(Governor, "submit", None)
     setattr(Governor, "submit", lambda governor, command, now_s: old(governor, replace(command, stamp_s=now_s), now_s))  # noqa: B010
@@ -111,7 +111,7 @@ def obey_by_arrival() -> None:
 
 def wait_longer() -> None:
     """Let a command drive for two seconds."""
-    from hal.governor import Governor
+    from lira.hal.safety.governor import Governor
 
     def lengthen(_: None, governor: Any, *__: Any) -> None:
         swap(governor, "_timeouts_s", dict.fromkeys(governor._timeouts_s, PATIENT_S))
@@ -121,7 +121,7 @@ def wait_longer() -> None:
 
 def let_policy_take_over() -> None:
     """Take a hand that falls silent for one that let go."""
-    from hal.governor import Governor
+    from lira.hal.safety.governor import Governor
 
     def forgive(governor: Any, now_s: float, grace_s: float) -> None:
         hand = governor._live.get(Source.TELEOP)
@@ -133,7 +133,7 @@ def let_policy_take_over() -> None:
 
 def sleep_on_watch() -> None:
     """Look at the time-outs only when a command comes."""
-    from hal.governor import Governor
+    from lira.hal.safety.governor import Governor
 
     old = swap(Governor, "_expire", None)
     setattr(Governor, "_expire", lambda *words: old(*words) if words[-1] > 0.0 else None)  # noqa: B010
@@ -141,21 +141,21 @@ def sleep_on_watch() -> None:
 
 def obey_nonsense() -> None:
     """Take what is not a number for a velocity."""
-    from hal import governor
+    from lira.hal.safety import governor
 
     swap(governor, "_is_finite", lambda _: True)
 
 
 def see_through() -> None:
     """Let the protective field allow everything."""
-    from hal import governor
+    from lira.hal.safety import governor
 
     swap(governor, "limit_speed", lambda *words: (words[2], ""))
 
 
 def never_time_out_in_the_base() -> None:
     """Let the base's driver repeat a command for ever."""
-    from robot.core2.device import Core2
+    from lira.robot.core2.device import Core2
 
     def lengthen(_: None, base: Any, *__: Any) -> None:
         swap(base, "_until_s", math.inf)
@@ -165,60 +165,60 @@ def never_time_out_in_the_base() -> None:
 
 def freeze_the_guard() -> None:
     """Let the guard never strike."""
-    from robot.core2.guard import Guard
+    from lira.robot.core2.watchdog import Guard
 
     after(Guard, "__init__", lambda _, guard, *__: os.kill(guard._process.pid, signal.SIGSTOP))
 
 
 def run_ahead() -> None:
     """Let a client believe that it is later than it is."""
-    from hal.clock import ClockEstimate
+    from lira.hal.bus.clock import ClockEstimate
 
     after(ClockEstimate, "now", lambda now_s, *_: now_s + 0.09)
 
 
 def arm_by_an_idle_hand() -> None:
     """Take the zero of a hand that has let go for a wish to drive."""
-    from hal.governor import Governor
+    from lira.hal.safety.governor import Governor
 
     def arm(_: None, governor: Any, command: Any, *__: Any) -> None:
         if command.source is Source.TELEOP and command.released:
-            governor._fire(import_module("hal.governor").Event.NEUTRAL)
+            governor._fire(import_module("lira.hal.safety.governor").Event.NEUTRAL)
 
     after(Governor, "_accept", arm)
 
 
 def never_miss_a_device() -> None:
     """Let the governor hear of no device that is lost."""
-    from hal.governor import Governor
+    from lira.hal.safety.governor import Governor
 
     swap(Governor, "note_devices", lambda *_: None)
 
 
 def poll_for_ever() -> None:
     """Read all there is of a topic, however much comes meanwhile, and all of it."""
-    bus = import_module("hal.bus")
+    bus = import_module("lira.hal.bus.bus")
     old = swap(bus.Bus, "reader", None)
     bus.Bus.reader = lambda self, topic, *_: old(self, replace(topic, max_bytes=1 << 30), 1 << 20)
-    swap(import_module("hal.session"), "_size_limits", lambda *_: [])
+    swap(import_module("lira.hal.bus.bus.zenoh_session"), "_size_limits", lambda *_: [])
 
 
 def promote_viewers() -> None:
     """Take every viewer for an operator."""
-    keys = import_module("hal.keys")
+    keys = import_module("lira.hal.bus.bus.keys")
     after(keys, "load_roles", lambda roles, *_: roles and dict.fromkeys(roles, keys.Role.OPERATOR))
 
 
 def keep_expired_links() -> None:
     """Let a link live longer than the certificate that it was opened with."""
-    from hal.keys import Keys
+    from lira.hal.bus.keys import Keys
 
     after(Keys, "link_config", lambda config, *_: config | {"close_link_on_expiration": False})
 
 
 def never_read_keys_again() -> None:
     """Believe for ever who was enrolled at the start."""
-    from hal.keys import Keys
+    from lira.hal.bus.keys import Keys
 
     swap(Keys, "changed", lambda _: False)
 
@@ -251,7 +251,7 @@ MUTANTS = (
         without_objection("late", "out of order"),
         ("commands forged with an old time",),
     ),
-    Mutant("commands of three seconds ahead are obeyed", constant("hal.governor", "AHEAD_S", 3.0),
+    Mutant("commands of three seconds ahead are obeyed", constant("lira.hal.safety.governor", "AHEAD_S", 3.0),
            ("stamps half a second ahead",)),
     Mutant("the client's clock runs ahead", run_ahead, ("link delayed more and more",), where="policy"),
     Mutant("the time-out is two seconds", wait_longer, ("commander frozen (SIGSTOP)", "black-out of 1 s")),
@@ -259,13 +259,13 @@ MUTANTS = (
     Mutant("a hand that falls silent lets go", let_policy_take_over, ("hand's bridge killed (kill -9)",)),
     Mutant("what is not a number is obeyed", obey_nonsense, ("commands of nan",)),
     Mutant("the protective field sees nothing", see_through, ("lidar freezes, and the commander drives on",)),
-    Mutant("a loop that hangs is kept alive", constant("hal.remote_realtime", "DECISION_S", FOREVER_S),
+    Mutant("a loop that hangs is kept alive", constant("lira.hal.client.realtime", "DECISION_S", FOREVER_S),
            ("commander's loop hangs",), where="policy"),
     Mutant("the base's driver repeats for ever", never_time_out_in_the_base, ("robot's governor hangs",)),
     Mutant("the guard never strikes", freeze_the_guard, ("robot's process frozen (SIGSTOP)",)),
     Mutant("an idle hand arms", arm_by_an_idle_hand,
            ("emergency stop beside an idle ROS joystick", "commander frozen beside an idle ROS joystick")),
-    Mutant("a silent board is told to go on", constant("robot.core2.contact", "SILENCE_S", 1.0),
+    Mutant("a silent board is told to go on", constant("lira.robot.core2.contact", "SILENCE_S", 1.0),
            ("board heard no more",)),
     Mutant("a lost device is not missed", never_miss_a_device, ("board reset, up after 1.1 s",)),
     Mutant("a device that is back arms", rewrite(("lost", "found", "armed")), ("board reset, up after 1.1 s",)),

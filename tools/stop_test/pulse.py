@@ -1,13 +1,13 @@
 """A process that does nothing but sleep, and notes when it was woken late: then this machine was busy, or stood still.
 
-python -m tools.stop_test.pulse JOURNAL
+python -m lira.tools.stop_test.pulse JOURNAL
 """
 
 import sys
 import time
 from pathlib import Path
 
-from tools.stop_test.journal import JournalWriter, Stalled
+from lira.tools.stop_test.journal import JournalWriter, Stalled
 
 READY = "beats"
 NAP_S = 0.005

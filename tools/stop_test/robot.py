@@ -2,7 +2,7 @@
 
 That is a twin, or, with the folder of a world's devices, the physical robot's drivers.
 
-python -m tools.stop_test.robot NAME HOST:PORT PROFILE JOURNAL CONTROL_PORT [FOLDER CAMERA_URL]
+python -m lira.tools.stop_test.robot NAME HOST:PORT PROFILE JOURNAL CONTROL_PORT [FOLDER CAMERA_URL]
 """
 
 import signal
@@ -15,18 +15,18 @@ from pathlib import Path
 import msgspec
 import numpy as np
 
-from hal.bus import Bus
-from hal.governed import GovernedRobot
-from hal.messages import Applied, Command, Image, LaserScan, Observation
-from hal.outlet import compress
-from hal.port import Robot
-from hal.profile import RobotProfile, load_profile
-from hal.refusals import count_refusals
-from hal.server import HalServer, stop_on_signal
-from robot.rosbot import Devices, Rosbot
-from sim_backend.twin import Twin
-from tools.stop_test.control import ASK_TIME, listen, print_time
-from tools.stop_test.journal import Heard, JournalWriter, Said, Truth, Wheels, moves
+from lira.hal.bus.access_log import count_refusals
+from lira.hal.bus.bus import Bus
+from lira.hal.messages import Applied, Command, Image, LaserScan, Observation
+from lira.hal.port import Robot
+from lira.hal.profile import RobotProfile, load_profile
+from lira.hal.safety.governed import GovernedRobot
+from lira.hal.server.sensor_publisher import compress
+from lira.hal.server.server import HalServer, stop_on_signal
+from lira.robot.rosbot import Devices, Rosbot
+from lira.sim_backend.twin import Twin
+from lira.tools.stop_test.control import ASK_TIME, listen, print_time
+from lira.tools.stop_test.journal import Heard, JournalWriter, Said, Truth, Wheels, moves
 
 READY = "serving"
 TRUTH_S = 0.01

@@ -6,10 +6,10 @@
 import signal
 from dataclasses import dataclass, field
 
-from hal.codec import encode
-from hal.messages import Bool
-from tools.stop_test import acts
-from tools.stop_test.acts import (
+from lira.hal.messages import Bool
+from lira.hal.messages.codec import encode
+from lira.tools.stop_test import acts
+from lira.tools.stop_test.acts import (
     HOUR_S,
     Act,
     driver_does,
@@ -23,7 +23,7 @@ from tools.stop_test.acts import (
     robot_does,
     world_does,
 )
-from tools.stop_test.setups import (
+from lira.tools.stop_test.setups import (
     BRIEF,
     CLOCKS,
     DRIVERS,
@@ -37,7 +37,7 @@ from tools.stop_test.setups import (
     TWIN,
     Setup,
 )
-from tools.stop_test.verdict import BASE, BOARD, DRIVER, ESTOP, FAREWELL, FIELD, GUARD, REFUSAL, WATCHDOG
+from lira.tools.stop_test.verdict import BASE, BOARD, DRIVER, ESTOP, FAREWELL, FIELD, GUARD, REFUSAL, WATCHDOG
 
 BUDGET_S = 0.35
 WATCHED_S = 0.7  # a device that fell silent has to be found out first

@@ -8,11 +8,11 @@ import time
 from pathlib import Path
 from typing import Any
 
-from hal.bus import Bus, Publisher
-from hal.governor import is_neutral
-from hal.messages import Twist
-from hal.topics import CMD_VEL, TELEOP
-from tools.stop_test.journal import SENDERS, JournalWriter, Sent
+from lira.hal.bus.bus import Bus, Publisher
+from lira.hal.bus.topics import CMD_VEL, TELEOP
+from lira.hal.messages import Twist
+from lira.hal.safety.governor import is_neutral
+from lira.tools.stop_test.journal import SENDERS, JournalWriter, Sent
 
 SENDER_RAD_S, TICK_RAD_S = 1e-4, 1e-13
 TICK_S, TICKS = 1e-6, 10**9  # marks return after 1,000 s, long after their journal was read

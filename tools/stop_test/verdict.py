@@ -11,8 +11,8 @@ from itertools import pairwise
 
 import numpy as np
 
-from hal.messages import Reason
-from tools.stop_test.journal import Heard, Journal, Said, Sent, Truth, Wheels
+from lira.hal.messages import Reason
+from lira.tools.stop_test.journal import Heard, Journal, Said, Sent, Truth, Wheels
 
 Result = dict[str, str | float | int | bool]
 ASKED = 3  # commands of motion that have to reach a robot that shall not move

@@ -3,7 +3,7 @@
 It goes on whatever happens to the robot's process. Control messages: `reset` puts the robot back to its start; `well`
 mends all; the others are the names in `Devices.break_`.
 
-python -m tools.stop_test.world PROFILE JOURNAL CONTROL_PORT FOLDER
+python -m lira.tools.stop_test.world PROFILE JOURNAL CONTROL_PORT FOLDER
 """
 
 import sys
@@ -15,15 +15,15 @@ from typing import Any
 
 import numpy as np
 
-from hal.messages import Episode
-from hal.profile import load_profile
-from hal.server import stop_on_signal
-from robot.core2.rosserial import ASK_TOPICS
-from sim_backend.emulators.bench import WiredTwin
-from sim_backend.polyline import Floats
-from tools.stop_test.control import listen
-from tools.stop_test.journal import JournalWriter
-from tools.stop_test.robot import NotedTwin, keep_truth, small_pictures
+from lira.hal.messages import Episode
+from lira.hal.profile import load_profile
+from lira.hal.server.server import stop_on_signal
+from lira.robot.core2.rosserial import ASK_TOPICS
+from lira.sim_backend.emulators.wired_twin import WiredTwin
+from lira.sim_backend.polyline import Floats
+from lira.tools.stop_test.control import listen
+from lira.tools.stop_test.journal import JournalWriter
+from lira.tools.stop_test.robot import NotedTwin, keep_truth, small_pictures
 
 READY = "devices, camera at "
 NEAR_M = 0.15  # in front of the lidar: inside the protective field

@@ -16,9 +16,9 @@ import sys
 from pathlib import Path
 from typing import TextIO
 
-from hal.config import write_whole
-from hal.errors import ConfigError
-from tools.bench import BENCHES, Row, cell, columns, describe_machine
+from lira.hal.config import write_whole
+from lira.hal.errors import ConfigError
+from lira.tools.bench import BENCHES, Row, cell, columns, describe_machine
 
 LASTING = ("soak", "drivers")  # those that go on for --minutes
 
@@ -38,7 +38,7 @@ def run(args: argparse.Namespace) -> int:
     if args.minutes is not None and args.name not in LASTING:
         raise ConfigError(f"'{args.name}' takes no --minutes", f"Only {' and '.join(LASTING)} do.")
     output = take_stdout() if args.json == "-" else sys.stdout
-    module = importlib.import_module(f"tools.bench.{args.name}")
+    module = importlib.import_module(f"lira.tools.bench.{args.name}")
     results: list[Row] = module.run(args.minutes) if args.minutes is not None else module.run()
     if args.json is not None:
         text = json.dumps({"name": args.name, "machine": describe_machine(), "results": results}, indent=2)
@@ -73,7 +73,7 @@ def write_file(path: Path, text: str) -> None:
 
 def table(results: list[Row]) -> str:
     """Rows for a person."""
-    from tools.table import format_table
+    from lira.tools.output.table import format_table
 
     names = columns(results)
     return format_table(names, [[cell(row.get(name)) for name in names] for row in results])

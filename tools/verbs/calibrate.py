@@ -17,11 +17,11 @@ from contextlib import closing
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from hal.errors import ConfigError
+from lira.hal.errors import ConfigError
 
 if TYPE_CHECKING:
-    from robot.settings import BaseSettings
-    from tools.calibration import Manoeuvre, Way
+    from lira.robot.settings import BaseSettings
+    from lira.tools.calibration import Manoeuvre, Way
 
 COARSE_RAD = math.pi  # reported: enough to know how many turns the fine one really makes
 COARSE_WINDOW_RAD = math.radians(45.0)
@@ -55,11 +55,11 @@ def run(args: argparse.Namespace) -> int:
     if not (0.2 <= args.distance <= 5.0 and 0.5 <= args.turns <= 20.0):
         raise ConfigError("--distance is 0.2 to 5 (metres), --turns 0.5 to 20", "Choose within these.")
 
-    from hal.governed import GovernedRobot
-    from hal.profile import load_profile
-    from robot.rosbot import Devices, Rosbot
-    from robot.settings import load_settings, write_base_setting
-    from tools.calibration import Manoeuvre, Pace
+    from lira.hal.profile import load_profile
+    from lira.hal.safety.governed import GovernedRobot
+    from lira.robot.rosbot import Devices, Rosbot
+    from lira.robot.settings import load_settings, write_base_setting
+    from lira.tools.calibration import Manoeuvre, Pace
 
     profile = load_profile(args.profile)
     settings = load_settings(args.settings if args.settings.exists() else None)
@@ -115,7 +115,7 @@ def ask_for_consent(args: argparse.Namespace, wanted: list[str]) -> None:
 
 def distance_by_lidar(manoeuvre: "Manoeuvre", args: argparse.Namespace) -> tuple[float, "Way"]:
     """Return true metres and the way: the wall ahead comes nearer by what was driven."""
-    from robot.calibration import wall_ahead_m
+    from lira.robot.calibration import wall_ahead_m
 
     manoeuvre.check(ahead_m=args.distance, lidar=True)
     before_m = wall_ahead_m(manoeuvre.scan())
@@ -130,7 +130,7 @@ def distance_by_lidar(manoeuvre: "Manoeuvre", args: argparse.Namespace) -> tuple
 
 def turn_by_lidar(manoeuvre: "Manoeuvre", args: argparse.Namespace) -> tuple[float, "Way"]:
     """Return true radians and the way: a small turn tells roughly, then the whole one exactly."""
-    from robot.calibration import turn_between
+    from lira.robot.calibration import turn_between
 
     manoeuvre.check(turns=True, lidar=True)
     first = manoeuvre.scan()
@@ -179,6 +179,6 @@ def ask_number(question: str) -> float:
 
 def not_measured(what: str, remedy: str) -> Exception:
     """What to raise when a measurement came to nothing."""
-    from tools.calibration import CalibrationError
+    from lira.tools.calibration import CalibrationError
 
     return CalibrationError(what, f"{remedy}, or say --by tape. Nothing was written.")

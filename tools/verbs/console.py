@@ -14,7 +14,7 @@ import argparse
 import contextlib
 from pathlib import Path
 
-from tools.lifetime import CLOSE_S, stop_or_interrupt
+from lira.tools.launch.lifetime import CLOSE_S, stop_or_interrupt
 
 ANSWER_S = 10.0
 
@@ -33,20 +33,20 @@ def run(args: argparse.Namespace) -> int:
     import os
 
     os.environ.setdefault("PYGAME_HIDE_SUPPORT_PROMPT", "1")
-    from tools.console.window import Keyboard, save_picture, show
+    from lira.tools.console.window import Keyboard, save_picture, show
 
     if args.screenshot is not None:
-        from tools.console.sample import sample_view
+        from lira.tools.console.sample import sample_view
 
         save_picture(sample_view(), str(args.screenshot))
         print(f"written: {args.screenshot}")
         return 0
 
-    from hal.bus import Bus
-    from hal.desk import LOCKSTEP, info_from_json
-    from hal.topics import INFO
-    from tools.console.listen import Ears
-    from tools.joystick.wheel import Wheel
+    from lira.hal.bus.bus import Bus
+    from lira.hal.bus.topics import INFO
+    from lira.hal.server.info_service import LOCKSTEP, info_from_json
+    from lira.tools.console.listen import Ears
+    from lira.tools.joystick.client import Wheel
 
     with contextlib.ExitStack() as stack:
         bus = Bus(args.name, connect=args.connect)

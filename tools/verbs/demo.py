@@ -26,12 +26,12 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from hal.errors import ConfigError, MissingExtraError
-from tools.arguments import add_protocol, natural
+from lira.hal.errors import ConfigError, MissingExtraError
+from lira.tools.options import add_protocol, natural
 
 if TYPE_CHECKING:
-    from tools.processes import ChildProcess
-    from tools.rig import Part
+    from lira.tools.launch.launch import Part
+    from lira.tools.launch.processes import ChildProcess
 
 NEEDED = {"pybullet": "sim", "torch": "learn"}  # by the two processes, and the extras that bring them
 NEEDED_BY_WIRE = {"serial": "robot"}
@@ -60,13 +60,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Run the demo from start to report."""
-    from fusion.expert_files import SHIPPED, expert_path
-    from fusion.syllabus import THESIS, with_proof
-    from fusion.tasks import TASKS, task_of
-    from hal.profile import load_profile
-    from sim_backend.catalogue import load_world
-    from tools.processes import free_port, lira_command
-    from tools.rig import direct, wired
+    from lira.fusion.experts.files import SHIPPED, expert_path
+    from lira.fusion.experts.tasks import TASKS, task_of
+    from lira.fusion.methods.syllabus import THESIS, with_proof
+    from lira.hal.profile import load_profile
+    from lira.sim_backend.catalogue import load_world
+    from lira.tools.launch.launch import direct, wired
+    from lira.tools.launch.processes import free_port, lira_command
 
     # What cannot work is refused before anything starts.
     world = args.world or ("lane" if args.wire else "line-obstacles")
@@ -79,7 +79,7 @@ def run(args: argparse.Namespace) -> int:
         if find_spec(package) is None:
             raise MissingExtraError(package, extra)
     with_proof(THESIS, args.proof)
-    from fusion.presets import method_named  # not sooner: it takes the learner's libraries
+    from lira.fusion.methods.presets import method_named  # not sooner: it takes the learner's libraries
 
     method_named(args.method)
     folder: Path = args.run or Path("runs") / f"demo-{datetime.now():%Y%m%d-%H%M%S}"
@@ -105,7 +105,7 @@ def supervise(parts: Sequence["Part"], fusion_command: list[str], folder: Path) 
 
     Raises `ProcessError` when one of them dies.
     """
-    from tools.report import RECORD
+    from lira.tools.report import RECORD
 
     if (folder / RECORD).exists():
         raise ConfigError(f"{folder} already holds a run", "Choose another folder with --run.")
@@ -120,21 +120,21 @@ def supervise(parts: Sequence["Part"], fusion_command: list[str], folder: Path) 
 
 def watch(parts: Sequence["Part"], fusion_command: list[str], folder: Path) -> None:
     """Start the robot, then the learner; return when the learner has ended by itself. Stops the learner first."""
-    from tools.processes import ChildProcess
-    from tools.rig import running
+    from lira.tools.launch.launch import running
+    from lira.tools.launch.processes import ChildProcess
 
     with (
         running(parts, folder, lambda line: print(line, flush=True)) as robot,
-        ChildProcess("the learner", fusion_command, folder / "fusion.log") as learner,
+        ChildProcess("the learner", fusion_command, folder / "lira.fusion.log") as learner,
     ):
         follow(robot, learner, folder)
 
 
 def follow(robot: Sequence["ChildProcess"], learner: "ChildProcess", folder: Path) -> None:
     """Show how the run gets on until the learner ends. Raises `ProcessError` if anything dies, or nothing happens."""
-    from tools.processes import ProcessError
-    from tools.progress import Display, Progress, Tail
-    from tools.report import RECORD
+    from lira.tools.launch.processes import ProcessError
+    from lira.tools.report import RECORD
+    from lira.tools.runs.progress import Display, Progress, Tail
 
     display, progress, tail = Display(sys.stdout), Progress(), Tail(folder / RECORD)
     ended, newest_s = False, time.monotonic()
@@ -170,11 +170,11 @@ def raise_dead(parts: Sequence["ChildProcess"]) -> None:
 
 def conclude(folder: Path) -> int:
     """Print the table, write the report, and return 0 if the novice was proven and passed every unseen layout."""
-    from tools.proven import proof_words, unseen_words
-    from tools.report import RECORD, write_report
-    from tools.report.digest import load_run
-    from tools.report.laps import COLUMNS, lap_cells
-    from tools.table import format_table
+    from lira.tools.output.proven import proof_words, unseen_words
+    from lira.tools.output.table import format_table
+    from lira.tools.report import RECORD, write_report
+    from lira.tools.report.digest import load_run
+    from lira.tools.report.laps import COLUMNS, lap_cells
 
     run = load_run(folder / RECORD)
     print(f"\n{format_table(COLUMNS, [lap_cells(lap) for lap in run.laps])}\n")

@@ -19,13 +19,13 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from hal.errors import ConfigError
-from tools.arguments import natural
-from tools.experiments.registry import REGISTRY, load
+from lira.hal.errors import ConfigError
+from lira.tools.experiments.registry import REGISTRY, load
+from lira.tools.options import natural
 
 if TYPE_CHECKING:
-    from tools.experiments.experiment import Experiment
-    from tools.experiments.summary import Summary
+    from lira.tools.experiments.experiment import Experiment
+    from lira.tools.experiments.summary import Summary
 
 FOLDER = Path("runs") / "experiments"
 ALL, RESULTS = "all", "results"
@@ -59,8 +59,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Run the trials that are missing and print the tables."""
-    from tools.experiments.summary import to_json
-    from tools.verbs.bench import take_stdout, write_file
+    from lira.tools.experiments.summary import to_json
+    from lira.tools.verbs.bench import take_stdout, write_file
 
     if args.seeds < 1 or args.workers < 1:
         raise ConfigError("--seeds and --workers are at least 1", "Give a positive number.")
@@ -81,11 +81,11 @@ def play(args: argparse.Namespace, name: str) -> "tuple[Summary, Path]":
     """Run one experiment; return its summary and its page."""
     import msgspec
 
-    from tools.experiments.page import write_page
-    from tools.experiments.pools import Cluster, Here
-    from tools.experiments.runner import run_trials
-    from tools.experiments.summary import summarise
-    from tools.training import provide
+    from lira.tools.experiments.page import write_page
+    from lira.tools.experiments.pools import Cluster, Here
+    from lira.tools.experiments.runner import run_trials
+    from lira.tools.experiments.summary import summarise
+    from lira.tools.runs.expert_training import provide
 
     experiment = load(name)
     pool = Here(args.workers) if args.scheduler is None else Cluster(args.scheduler)
@@ -127,7 +127,7 @@ def chosen_methods(words: str | None, experiment: "Experiment", name: str) -> se
 
 def show(summary: "Summary", page: Path) -> None:
     """Print tables, verdicts and where the page is."""
-    from tools.verbs.bench import table
+    from lira.tools.verbs.bench import table
 
     for each in summary.tables:
         print(f"\n{each.title}\n{table(each.rows)}")
@@ -143,8 +143,8 @@ def show(summary: "Summary", page: Path) -> None:
 
 def write_results(args: argparse.Namespace) -> int:
     """Play everything first if asked to; then write RESULTS.md from the summaries that are there."""
-    from tools.experiments import document
-    from tools.experiments.summary import read_summaries, write_summary
+    from lira.tools.experiments import document
+    from lira.tools.experiments.summary import read_summaries, write_summary
 
     if args.methods is not None:
         raise ConfigError(f"{args.name} takes no --methods", "It is about all of them.")

@@ -20,15 +20,15 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from fusion.tasks import TASKS, task_of
-from hal.errors import ConfigError
-from tools.arguments import add_protocol, natural
-from tools.lifetime import CLOSE_S
+from lira.fusion.experts.tasks import TASKS, task_of
+from lira.hal.errors import ConfigError
+from lira.tools.launch.lifetime import CLOSE_S
+from lira.tools.options import add_protocol, natural
 
 if TYPE_CHECKING:
-    from fusion.presets import Method
-    from hal.messages import Decision
-    from hal.remote import RemoteRobot
+    from lira.fusion.methods.presets import Method
+    from lira.hal.client.remote import RemoteRobot
+    from lira.hal.messages import Decision
 
 ENDPOINT = "127.0.0.1:7447"
 
@@ -96,8 +96,8 @@ def run(args: argparse.Namespace) -> int:
     """Drive until done or told to stop. Exit status 1 if the novice or the policy did not drive alone as it should."""
     import torch
 
-    from hal.bus import Bus
-    from hal.remote import RemoteRobot
+    from lira.hal.bus.bus import Bus
+    from lira.hal.client.remote import RemoteRobot
 
     if args.method is not None and method_of(args).kind == "switching" and args.teacher == "none":
         raise ConfigError(f"by the method '{args.method}' nobody learns", "Show it on a twin with --teacher perfect.")
@@ -112,7 +112,7 @@ def run(args: argparse.Namespace) -> int:
             return show(args, robot)
         if args.teacher == "none":
             return learn_by_hand(args, robot)
-        from tools.arena import teach
+        from lira.tools.runs.on_twin import teach
 
         return teach(args, method_of(args), robot, publisher(robot), say)
     finally:
@@ -123,20 +123,20 @@ def run(args: argparse.Namespace) -> int:
 def show(args: argparse.Namespace, robot: "RemoteRobot") -> int:
     """Let a policy drive: through unseen layouts of a twin if it is asked to, else until it is told to stop."""
     if args.unseen:
-        from tools.arena import examine
+        from lira.tools.runs.on_twin import examine
 
         return examine(args, robot, publisher(robot), say)
-    from tools.person import show_policy
+    from lira.tools.runs.with_person import show_policy
 
     return show_policy(args, robot, publisher(robot), say)
 
 
 def learn_by_hand(args: argparse.Namespace, robot: "RemoteRobot") -> int:
     """Learn from whoever takes the wheel."""
-    from fusion.session import Apprentice
-    from fusion.trainer import ProcessTrainer
-    from tools.assembly import apprentice
-    from tools.person import learn_from_person, world_of
+    from lira.fusion.learning.trainer import ProcessTrainer
+    from lira.fusion.teaching.session import Apprentice
+    from lira.tools.runs.build import apprentice
+    from lira.tools.runs.with_person import learn_from_person, world_of
 
     def make() -> Apprentice:
         pair = args.experts or task_of(world_of(robot))
@@ -149,9 +149,9 @@ def method_of(args: argparse.Namespace) -> "Method":
     """Return the method by name, with what the other arguments say about it. Raises `ConfigError`."""
     import msgspec
 
-    from fusion.lira import LiraSettings
-    from fusion.presets import method_named
-    from fusion.syllabus import with_proof
+    from lira.fusion.methods.lira import LiraSettings
+    from lira.fusion.methods.presets import method_named
+    from lira.fusion.methods.syllabus import with_proof
 
     method = method_named(args.method)
     if args.start is not None:
@@ -169,7 +169,7 @@ def method_of(args: argparse.Namespace) -> "Method":
 
 def publisher(robot: "RemoteRobot") -> Callable[["Decision"], None]:
     """Return what puts decisions on the bus."""
-    from hal.topics import DECISION
+    from lira.hal.bus.topics import DECISION
 
     topic = robot.bus.publisher(DECISION)
     return lambda decision: topic.put(decision, robot.now())

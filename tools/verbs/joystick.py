@@ -16,8 +16,8 @@ import argparse
 import sys
 from pathlib import Path
 
-from hal.errors import DeviceError
-from tools.lifetime import CLOSE_S, stop_or_interrupt
+from lira.hal.errors import DeviceError
+from lira.tools.launch.lifetime import CLOSE_S, stop_or_interrupt
 
 ANSWER_S = 10.0
 
@@ -36,21 +36,21 @@ def run(args: argparse.Namespace) -> int:
     """Bridge until told to stop."""
     if not sys.platform.startswith("linux"):
         raise DeviceError("gamepads are read through Linux's evdev", "Use `lira console`, which has a keyboard.")
-    from tools.joystick.mapping import load_mapping
+    from lira.tools.joystick.mapping import load_mapping
 
     mapping = load_mapping(args.pad)
-    from tools.joystick.pad import Finder  # without evdev, that is said before a robot is looked for
+    from lira.tools.joystick.pad import Finder  # without evdev, that is said before a robot is looked for
 
     if args.learn is not None:
-        from tools.joystick.ask import learn
+        from lira.tools.joystick.pad_wizard import learn
 
         return learn(args.learn, args.device)
 
-    from hal.bus import Bus
-    from hal.topics import INFO
-    from tools.joystick.bridge import Bridge
-    from tools.joystick.memory import PadMemory, state_file
-    from tools.joystick.wheel import Wheel
+    from lira.hal.bus.bus import Bus
+    from lira.hal.bus.topics import INFO
+    from lira.tools.joystick.bridge import Bridge
+    from lira.tools.joystick.client import Wheel
+    from lira.tools.joystick.known_pads import PadMemory, state_file
 
     bus, watch = Bus(args.name, connect=args.connect), None
     try:

@@ -24,7 +24,7 @@ import argparse
 from datetime import timedelta
 from pathlib import Path
 
-from hal.errors import ConfigError
+from lira.hal.errors import ConfigError
 
 MOST_DAYS = 3650
 
@@ -59,8 +59,8 @@ def _days(text: str) -> timedelta:
 
 def run(args: argparse.Namespace) -> int:
     """Do what is asked."""
-    from hal.keys import CA, CERTIFICATE, ROLES, Role
-    from tools.authority import PEER_LIFE, ROBOT, enroll, init, renew, revoke
+    from lira.hal.bus.keys import CA, CERTIFICATE, ROLES, Role
+    from lira.tools.authority import PEER_LIFE, ROBOT, enroll, init, renew, revoke
 
     folder: Path = args.folder
     tell_robot = f"copy {CA} and {ROLES} of {folder / ROBOT} to the robot again: they name who is enrolled"
@@ -86,8 +86,8 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _show(folder: Path) -> None:
-    from tools.authority import enrolled
-    from tools.table import format_table
+    from lira.tools.authority import enrolled
+    from lira.tools.output.table import format_table
 
     found = enrolled(folder)
     if not found:

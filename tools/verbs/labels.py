@@ -17,7 +17,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from fusion.label_salvage import Survey
+    from lira.fusion.log.label_salvage import Survey
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -32,9 +32,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Check, repair if asked to, and say what was found."""
-    from fusion.demonstrations import check_log, repair_log
-    from hal.profile import known_profiles, load_profile
-    from tools.verbs.bench import write_file
+    from lira.fusion.log.label_log import check_log, repair_log
+    from lira.hal.profile import known_profiles, load_profile
+    from lira.tools.verbs.bench import write_file
 
     robots = [load_profile(name) for name in ([args.profile] if args.profile else known_profiles())]
     kept: Path | None = None

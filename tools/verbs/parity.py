@@ -20,14 +20,14 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING
 
-from hal.errors import ConfigError, StorageError
-from tools.arguments import natural
-from tools.lifetime import CLOSE_S
+from lira.hal.errors import ConfigError, StorageError
+from lira.tools.launch.lifetime import CLOSE_S
+from lira.tools.options import natural
 
 if TYPE_CHECKING:
-    from tools.parity.compare import Row
-    from tools.parity.record import Recording
-    from tools.rig import Part
+    from lira.tools.launch.launch import Part
+    from lira.tools.parity.compare import Row
+    from lira.tools.parity.record import Recording
 
 PAGE = "parity.html"
 OWN = ("twin", "wire")
@@ -48,7 +48,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Drive both, print the table, write what was asked for."""
-    from tools.parity.compare import DIFFERS, compare
+    from lira.tools.parity.compare import DIFFERS, compare
 
     ends = [address(word) for word in args.robots]
     if len(ends) not in (0, 2):
@@ -71,8 +71,8 @@ def address(word: str) -> tuple[str, str]:
 
 def over_bus(name: str, endpoint: str, shown: str = "") -> "Recording":
     """Drive a robot that is on the bus through the script."""
-    from hal.bus import Bus
-    from tools.parity.record import record
+    from lira.hal.bus.bus import Bus
+    from lira.tools.parity.record import record
 
     print(f"{shown or f'{name}@{endpoint}'}: ...", file=sys.stderr, flush=True)
     bus = Bus(name, connect=endpoint)
@@ -84,11 +84,11 @@ def over_bus(name: str, endpoint: str, shown: str = "") -> "Recording":
 
 def own(args: argparse.Namespace) -> "tuple[Recording, Recording]":
     """Start the twin on the bus, drive it, and the same again through the wire; one after the other."""
-    from hal.profile import load_profile
-    from robot.settings import load_settings
-    from sim_backend.catalogue import load_world
-    from tools.processes import free_port
-    from tools.rig import direct, wired
+    from lira.hal.profile import load_profile
+    from lira.robot.settings import load_settings
+    from lira.sim_backend.catalogue import load_world
+    from lira.tools.launch.launch import direct, wired
+    from lira.tools.launch.processes import free_port
 
     load_profile(args.profile)
     load_world(args.world)
@@ -111,8 +111,8 @@ def own(args: argparse.Namespace) -> "tuple[Recording, Recording]":
 
 def started(parts: "list[Part]", logs: Path, name: str, endpoint: str, shown: str) -> "Recording":
     """Start a robot's processes, drive it, and stop them; from the beginning again if the machine was too busy."""
-    from tools.parity.record import InterruptedScriptError
-    from tools.rig import running
+    from lira.tools.launch.launch import running
+    from lira.tools.parity.record import InterruptedScriptError
 
     for _ in range(ATTEMPTS - 1):
         try:
@@ -128,10 +128,10 @@ def show(args: argparse.Namespace, first: "Recording", second: "Recording", rows
     """Print the table, or write it as JSON and as a page."""
     import msgspec
 
-    from tools.parity.compare import cells
-    from tools.parity.page import COLUMNS, render
-    from tools.table import format_table
-    from tools.verbs.bench import take_stdout, write_file
+    from lira.tools.output.table import format_table
+    from lira.tools.parity.compare import cells
+    from lira.tools.parity.page import COLUMNS, render
+    from lira.tools.verbs.bench import take_stdout, write_file
 
     output = take_stdout() if args.json == "-" else sys.stdout
     if args.out is not None:

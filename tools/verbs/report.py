@@ -15,7 +15,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Write the page and print its path."""
-    from tools.report import RECORD, write_report
+    from lira.tools.report import RECORD, write_report
 
     folder = args.run.parent if args.run.name == RECORD else args.run
     print(write_report(folder))

@@ -15,7 +15,7 @@ import threading
 from pathlib import Path
 from typing import Protocol
 
-from hal.errors import ConfigError
+from lira.hal.errors import ConfigError
 
 LOOK_S = 0.2
 
@@ -65,16 +65,16 @@ def run(args: argparse.Namespace) -> int:
             what = f"both --{device} and --without {device}" if given else f"no --{device}"
             raise ConfigError(what, f"Give its URL, or say --without {device} to drive without it.")
 
-    from hal.profile import load_profile
-    from robot.settings import load_settings
+    from lira.hal.profile import load_profile
+    from lira.robot.settings import load_settings
 
     profile, settings = load_profile(args.profile), load_settings(args.settings)
 
-    from hal.bus import Bus
-    from hal.governed import GovernedRobot
-    from hal.refusals import count_refusals
-    from hal.server import HalServer, stop_on_signal
-    from robot.rosbot import Devices, Rosbot
+    from lira.hal.bus.access_log import count_refusals
+    from lira.hal.bus.bus import Bus
+    from lira.hal.safety.governed import GovernedRobot
+    from lira.hal.server.server import HalServer, stop_on_signal
+    from lira.robot.rosbot import Devices, Rosbot
 
     robot = Rosbot(profile, Devices(args.base, args.lidar, args.camera, args.openni, settings))
     bus = Bus(args.name, listen=args.listen, insecure=args.insecure, refusals=count_refusals())

@@ -17,10 +17,10 @@ import threading
 import time
 from typing import TYPE_CHECKING
 
-from hal.errors import ConfigError
+from lira.hal.errors import ConfigError
 
 if TYPE_CHECKING:
-    from hal.bus import Bus
+    from lira.hal.bus.bus import Bus
 
 LINK_S = 3.0
 LOOK_S = 0.05
@@ -64,12 +64,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Serve until told to stop."""
-    from hal.bus import Bus
-    from hal.governed import GovernedRobot
-    from hal.profile import load_profile
-    from hal.server import HalServer, stop_on_signal
-    from robot.ros2.robot import Interface, Ros2Robot
-    from tools.verbs.robot import report
+    from lira.hal.bus.bus import Bus
+    from lira.hal.profile import load_profile
+    from lira.hal.safety.governed import GovernedRobot
+    from lira.hal.server.server import HalServer, stop_on_signal
+    from lira.robot.ros2.robot import Interface, Ros2Robot
+    from lira.tools.verbs.robot import report
 
     interface = Interface(topics(args.topic), args.cmd_vel == "twist_stamped", math.radians(args.lidar_yaw))
     profile = load_profile(args.profile)
@@ -107,7 +107,7 @@ def topics(words: list[str]) -> dict[str, str]:
 
 def warnings(far: "Bus", *, stamped: bool) -> list[str]:
     """What is missing beside a robot that runs our server."""
-    from hal.bus import LINKS_PER_PEER
+    from lira.hal.bus.bus import LINKS_PER_PEER
 
     until_s = time.monotonic() + LINK_S
     while far.links() < LINKS_PER_PEER and time.monotonic() < until_s:

@@ -26,7 +26,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
-from hal.errors import ConfigError
+from lira.hal.errors import ConfigError
 
 TIMES = ("fault", "n", "p50_s", "p99_s", "max_time_to_zero_s", "budget_s", "fault_to_zero_s", "distance_m")
 COLUMNS = (*TIMES, "stale_obeyed", "moved_unasked", "asked", "refused", "stopped_by", "passed")
@@ -49,8 +49,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Run the matrix, or the mutants."""
-    from tools.bench import describe_machine
-    from tools.verbs.bench import take_stdout, write_file
+    from lira.tools.bench import describe_machine
+    from lira.tools.verbs.bench import take_stdout, write_file
 
     output = take_stdout() if args.json == "-" else sys.stdout
     signal.signal(signal.SIGTERM, signal.default_int_handler)  # whatever ends this ends all that it has started
@@ -71,8 +71,8 @@ def run(args: argparse.Namespace) -> int:
 
 def try_rows(args: argparse.Namespace, folder: Path) -> Sequence[Cells]:
     """Try what was asked for."""
-    from tools.stop_test.matrix import Matrix, missing
-    from tools.stop_test.rows import ROWS
+    from lira.tools.stop_test.matrix import Matrix, missing
+    from lira.tools.stop_test.rows import ROWS
 
     rows = [row for row in ROWS if (row.quick or not args.quick) and args.only in row.name]
     if not rows:
@@ -87,8 +87,8 @@ def try_rows(args: argparse.Namespace, folder: Path) -> Sequence[Cells]:
 
 def try_mutants(args: argparse.Namespace, folder: Path) -> Sequence[Cells]:
     """Break the product in every known way."""
-    from tools.stop_test.cull import cull
-    from tools.stop_test.mutants import MUTANTS
+    from lira.tools.stop_test.cull import cull
+    from lira.tools.stop_test.mutants import MUTANTS
 
     mutants = [mutant for mutant in MUTANTS if args.only in mutant.name]
     if not mutants:
@@ -115,7 +115,7 @@ def say(line: str) -> None:
 
 def as_table(columns: Sequence[str], results: Sequence[Cells]) -> str:
     """Results for a person."""
-    from tools.bench import cell
-    from tools.table import format_table
+    from lira.tools.bench import cell
+    from lira.tools.output.table import format_table
 
     return format_table(columns, [[cell(result[name]) for name in columns] for result in results])

@@ -18,9 +18,9 @@ import argparse
 import os
 from pathlib import Path
 
-from fusion.tasks import DEFAULT, TASKS
-from hal.errors import ConfigError, LiraError, StorageError
-from tools.arguments import natural
+from lira.fusion.experts.tasks import DEFAULT, TASKS
+from lira.hal.errors import ConfigError, LiraError, StorageError
+from lira.tools.options import natural
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -34,9 +34,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Train, measure the cruise action, save. Exit status 1 if the expert did not pass its curriculum."""
-    from fusion.expert_files import shipped_path
-    from hal.profile import load_profile
-    from tools.training import command, train_expert
+    from lira.fusion.experts.files import shipped_path
+    from lira.hal.profile import load_profile
+    from lira.tools.runs.expert_training import command, train_expert
 
     owner = TASKS[args.task].lidar
     if args.expert == "lidar" and owner != args.task:

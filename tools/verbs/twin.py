@@ -20,15 +20,15 @@ from contextlib import ExitStack
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from hal.errors import ConfigError
-from tools.arguments import natural
+from lira.hal.errors import ConfigError
+from lira.tools.options import natural
 
 if TYPE_CHECKING:
-    from hal.bus import Bus
-    from hal.profile import RobotProfile
-    from sim_backend.emulators.bench import WiredTwin
-    from sim_backend.twin import Twin
-    from sim_backend.world import World
+    from lira.hal.bus.bus import Bus
+    from lira.hal.profile import RobotProfile
+    from lira.sim_backend.emulators.wired_twin import WiredTwin
+    from lira.sim_backend.twin import Twin
+    from lira.sim_backend.world import World
 
 LOOK_S = 0.2
 STATUS_S = 10.0
@@ -74,8 +74,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Serve until told to stop."""
-    from hal.profile import load_profile
-    from sim_backend.catalogue import load_world
+    from lira.hal.profile import load_profile
+    from lira.sim_backend.catalogue import load_world
 
     # What is wrong with the words is said at once, before anything heavy is loaded.
     profile, world = load_profile(args.profile), load_world(args.world)
@@ -87,11 +87,11 @@ def run(args: argparse.Namespace) -> int:
 
     import msgspec
 
-    from hal.bus import Bus
-    from hal.governed import GovernedRobot
-    from hal.refusals import count_refusals
-    from hal.server import HalServer, stop_on_signal
-    from sim_backend.twin import Twin
+    from lira.hal.bus.access_log import count_refusals
+    from lira.hal.bus.bus import Bus
+    from lira.hal.safety.governed import GovernedRobot
+    from lira.hal.server.server import HalServer, stop_on_signal
+    from lira.sim_backend.twin import Twin
 
     factor = None if args.lockstep else args.speed
     twin = Twin(profile, world, layout=args.layout, seed=args.seed, realtime_factor=factor, renderer=args.renderer)
@@ -122,10 +122,10 @@ def run(args: argparse.Namespace) -> int:
 
 def run_wire(args: argparse.Namespace, profile: "RobotProfile", world: "World") -> int:
     """Be the robot's devices until told to stop."""
-    from hal.bus import Bus
-    from hal.server import stop_on_signal
-    from sim_backend.emulators.bench import WiredTwin, sweeping
-    from sim_backend.twin import Twin
+    from lira.hal.bus.bus import Bus
+    from lira.hal.server.server import stop_on_signal
+    from lira.sim_backend.emulators.wired_twin import WiredTwin, sweeping
+    from lira.sim_backend.twin import Twin
 
     sweep = sweeping(profile)
     twin = Twin(sweep, world, layout=args.layout, seed=args.seed, realtime_factor=1.0, renderer=args.renderer)
@@ -164,8 +164,8 @@ def serve_arena(wired: "WiredTwin", bus: "Bus", profile: "RobotProfile", world: 
     """Tell the truth, and put the robot back when asked, until told to stop."""
     import msgspec
 
-    from hal.desk import REALTIME, Info
-    from hal.serve_arena import ArenaLoop
+    from lira.hal.server.arena import ArenaLoop
+    from lira.hal.server.info_service import REALTIME, Info
 
     info = Info(profile, REALTIME, bus.epoch, msgspec.Raw(msgspec.json.encode(world)))
     ArenaLoop(wired, bus, info, wired.twin.now).run(stop)
@@ -173,7 +173,7 @@ def serve_arena(wired: "WiredTwin", bus: "Bus", profile: "RobotProfile", world: 
 
 def report(twin: "Twin", bus: "Bus", stop: threading.Event) -> None:
     """Say now and then who drives, how fast, and what was hit; nothing while nothing changes."""
-    from hal.topics import APPLIED
+    from lira.hal.bus.topics import APPLIED
 
     applied, said, hit, collisions = bus.reader(APPLIED), "", False, 0
     next_s = time.monotonic()

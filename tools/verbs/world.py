@@ -20,10 +20,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Draw, and say where the picture is."""
-    from hal.errors import ConfigError
-    from hal.profile import load_profile
-    from sim_backend.catalogue import load_world
-    from sim_backend.layout import build
+    from lira.hal.errors import ConfigError
+    from lira.hal.profile import load_profile
+    from lira.sim_backend.catalogue import load_world
+    from lira.sim_backend.layout import build
 
     picture: Path = args.picture
     if picture.suffix.lower() != ".png":
@@ -32,7 +32,7 @@ def run(args: argparse.Namespace) -> int:
 
     import cv2
 
-    from tools.world_picture import draw
+    from lira.tools.output.world_picture import draw
 
     _, data = cv2.imencode(".png", draw(layout, profile), [cv2.IMWRITE_PNG_COMPRESSION, 9])
     try:

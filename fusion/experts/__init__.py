@@ -1,0 +1,1 @@
+"""Experts by name, and the tasks they belong to."""

@@ -1,0 +1,66 @@
+"""Where the experts' checkpoints lie. Without torch: what is missing is said before anything heavy is loaded.
+
+A *pair* says whose experts are meant: those of a task, by its name; others of that task, as TASK@SEED, trained when an
+experiment needs them; or a user's own, by the folder that holds `camera.safetensors` and `lidar.safetensors`.
+"""
+
+from importlib import resources
+from pathlib import Path
+from typing import Literal
+
+from lira.fusion.experts.tasks import DEFAULT, TASKS
+from lira.hal.errors import ConfigError
+from lira.hal.profile import RobotProfile
+
+Sensor = Literal["camera", "lidar"]
+SHIPPED: tuple[Sensor, ...] = ("camera", "lidar")
+TRAINED = Path("runs") / "experts"
+
+
+def seeded(pair: str) -> tuple[str, int] | None:
+    """Take TASK@SEED apart; None for a pair of another kind. Raises `ConfigError` for what is no task or no seed."""
+    task, at, seed = pair.partition("@")
+    if not at or "/" in pair:
+        return None
+    if task not in TASKS or not seed.isdecimal():
+        raise ConfigError(f"'{pair}' is no pair of experts", f"Give one like {DEFAULT}@1; tasks: {', '.join(TASKS)}.")
+    return task, int(seed)
+
+
+def folder_of(pair: str) -> Path:
+    """Where the files of a pair lie that does not come with the project. Raises `ConfigError`."""
+    found = seeded(pair)
+    return Path(pair) if found is None else TRAINED / f"{found[0]}-{found[1]}"
+
+
+def shipped_path(name: str, profile: RobotProfile, task: str = DEFAULT) -> Path:
+    """Where the expert that comes with the project lies."""
+    owner = TASKS[task].lidar if name == "lidar" else task
+    words = [profile.name, *([] if owner == DEFAULT else [owner]), name]
+    return Path(str(resources.files("lira.fusion") / "pretrained" / f"{'-'.join(words)}.safetensors"))
+
+
+def expert_path(name_or_path: str, profile: RobotProfile, pair: str = DEFAULT) -> Path:
+    """Where an expert's checkpoint lies. Raises `ConfigError` for a name that does not exist for this robot or pair."""
+    if name_or_path.endswith(".safetensors"):
+        return Path(name_or_path)
+    name = name_or_path.removesuffix("-expert")
+    if name not in SHIPPED:
+        names = ", ".join(f"{name}-expert" for name in SHIPPED)
+        raise ConfigError(f"unknown policy '{name_or_path}'", f"Known: {names}; or give a .safetensors file.")
+    train = f"lira train-expert {name} --profile {profile.name}"
+    if pair not in TASKS:
+        path = folder_of(pair) / f"{name}.safetensors"
+        if not path.exists():
+            known = ", ".join(TASKS)
+            what = f"there is no {name} expert {path}"
+            raise ConfigError(what, f"Train one: {train} --out {path}; or name a task: {known}; or TASK@SEED.")
+        return path
+    path = shipped_path(name, profile, pair)
+    if not path.exists():
+        words = "" if pair == DEFAULT else f" --task {pair}"
+        where = "" if pair == DEFAULT else f" for the task '{pair}'"
+        raise ConfigError(
+            f"no {name} expert comes with the profile '{profile.name}'{where}", f"Train one with: {train}{words}"
+        )
+    return path

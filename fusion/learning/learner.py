@@ -1,0 +1,157 @@
+"""One training step as in the thesis: 50 minibatch updates of 32 labels, Adam, mean squared error, warm start."""
+
+import copy
+from functools import cached_property
+
+import numpy as np
+import torch
+from torch import Tensor
+
+from lira.fusion.learning.label_store import FileRows, Rows
+from lira.fusion.learning.labels import Label as Label
+from lira.fusion.learning.labels import mirror
+from lira.fusion.policies.ensemble import EnsembleNet
+from lira.fusion.policies.networks import CameraTrunk, LidarTrunk, Network
+from lira.fusion.policies.networks import Weights as Weights
+from lira.fusion.preprocess import to_uint8
+
+RESIDENT_BYTES = 128 * 2**20  # of inputs in memory; 10,000 labels with frozen trunks, 92,000 without
+BOOTSTRAP = 0xB007  # the ensemble's draws are a stream of their own, and leave the novice's alone
+
+
+class Learner:
+    """Trains a copy of a network on the labels it has been given, and with `mirrored` on their mirror images too.
+
+    Deterministic for one seed, one number of threads and one kind of processor. Labels are kept once, in growing
+    arrays: with `frozen_trunks` as the trunk's output (3,200 floats, 12.8 kB), which is then never computed again,
+    otherwise as the scan and an 8-bit image, which is what the camera gave (1.4 kB). From `resident_bytes` on, the
+    scans and images of further labels go to a temporary file, and the trunks see them when they are drawn.
+
+    An `EnsembleNet` gets its members trained as well: a label counts for each as often as a draw from Poisson(1) says,
+    the bootstrap of a stream.
+    """
+
+    def __init__(
+        self,
+        network: Network,
+        *,
+        batch: int = 32,
+        updates: int = 50,
+        learning_rate: float = 1e-3,
+        seed: int,
+        frozen_trunks: bool,
+        mirrored: bool = False,
+        resident_bytes: int = RESIDENT_BYTES,
+    ) -> None:
+        self._network = copy.deepcopy(network).requires_grad_(True)
+        for trunk in self._network.modules():
+            if frozen_trunks and isinstance(trunk, CameraTrunk | LidarTrunk):
+                trunk.requires_grad_(False)
+            elif isinstance(trunk, CameraTrunk):
+                trunk.reduced_precision = _has_bfloat16()
+        self._frozen_trunks = frozen_trunks
+        self._mirrored = mirrored
+        self._batch, self._updates = batch, updates
+        self._random = np.random.default_rng(seed)
+        self._bootstrap = np.random.default_rng([seed, BOOTSTRAP])
+        self._resident_bytes = resident_bytes
+        self._inputs: list[Rows] = []
+        self._spilled: FileRows | None = None
+        self._members = self._network.members if isinstance(self._network, EnsembleNet) else 0
+        self._targets = Rows((3 + self._members,), torch.float32)  # linear, angular, weight, times for each member
+        self._learning_rate = learning_rate
+
+    def __len__(self) -> int:
+        return self._targets.count
+
+    def add(self, label: Label) -> None:
+        """Keep one label. Raises `OSError` when it does not fit the memory and the temporary folder is full."""
+        self._keep(label)
+        if self._mirrored:
+            self._keep(mirror(label))
+
+    def train_step(self) -> float:
+        """Run one training step and return its mean loss. Raises `ValueError` without labels."""
+        if not len(self):
+            raise ValueError("there is nothing to learn from yet")
+        picks = torch.from_numpy(self._random.integers(len(self), size=(self._updates, self._batch)))
+        return sum(self._update(pick) for pick in picks) / self._updates
+
+    def weights(self) -> Weights:
+        """Copy the network's weights."""
+        return self._network.weights()
+
+    @cached_property
+    def _adam(self) -> torch.optim.Adam:
+        """Made by whoever trains: PyTorch's optimisers load for seconds and take 80 MB."""
+        trained = [parameter for parameter in self._network.parameters() if parameter.requires_grad]
+        return torch.optim.Adam(trained, lr=self._learning_rate, fused=True)
+
+    def _keep(self, label: Label) -> None:
+        gray = to_uint8(label.image)
+        if self._spilled is not None:
+            self._spilled.append(label.scan, gray)
+        else:
+            self._keep_in_memory(label, torch.from_numpy(gray))
+        times = self._bootstrap.poisson(1.0, self._members) if self._members else ()
+        self._targets.append(torch.tensor([*label.action, label.weight, *times]))
+
+    def _keep_in_memory(self, label: Label, gray: Tensor) -> None:
+        scan = torch.from_numpy(label.scan)
+        if self._frozen_trunks:
+            rows = [self._frozen_features(scan[None], torch.from_numpy(label.image)[None])[0]]
+        else:
+            rows = [scan, gray]
+        if not self._inputs:
+            self._inputs = [Rows(tuple(row.shape), row.dtype) for row in rows]
+        for store, row in zip(self._inputs, rows, strict=True):
+            store.append(row)
+        if (self._inputs[0].count + 1) * sum(store.row_bytes for store in self._inputs) > self._resident_bytes:
+            self._spilled = FileRows(label.scan.shape, label.image.shape)
+
+    def _update(self, pick: Tensor) -> float:
+        features = self._features(pick)
+        targets = self._targets.rows[pick]
+        error = (self._network.head(features) - targets[:, :2]).square() * targets[:, 2:3]
+        loss = error.mean()
+        self._adam.zero_grad()
+        (loss + self._members_loss(features, targets)).backward()  # type: ignore[no-untyped-call]
+        self._adam.step()
+        return loss.item()
+
+    def _members_loss(self, features: Tensor, targets: Tensor) -> Tensor | float:
+        if not isinstance(self._network, EnsembleNet):
+            return 0.0
+        times = targets[:, 3:].T.unsqueeze(2) * targets[:, 2:3]
+        error = (self._network.member_heads(features) - targets[:, :2]).square() * times
+        return error.mean(dim=(1, 2)).sum()
+
+    def _features(self, pick: Tensor) -> Tensor:
+        """Trunk output of some labels [n, size], from wherever they are kept."""
+        resident = self._inputs[0].count
+        near = pick < resident
+        kept = [store.rows[pick[near]] for store in self._inputs]
+        if self._spilled is None or bool(near.all()):
+            return kept[0] if self._frozen_trunks else self._network.features(kept[0], _scaled(kept[1]))
+        scan, gray = self._spilled.read((pick[~near] - resident).tolist())
+        if not self._frozen_trunks:
+            scans, images = torch.cat([kept[0], scan]), torch.cat([kept[1], gray])
+            features = self._network.features(scans, _scaled(images))
+        else:
+            features = torch.cat([kept[0], self._frozen_features(scan, _scaled(gray))])
+        order = torch.cat([near.nonzero(), (~near).nonzero()])[:, 0]
+        return features[order.argsort()]
+
+    def _frozen_features(self, scan: Tensor, image: Tensor) -> Tensor:
+        with torch.no_grad():
+            return self._network.features(scan, image)
+
+
+def _scaled(gray: Tensor) -> Tensor:
+    return gray.to(torch.float32) / 255
+
+
+def _has_bfloat16() -> bool:
+    """Whether the processor convolves in bfloat16 natively; elsewhere that is slower than float32."""
+    capable = torch.cpu.get_capabilities()
+    return bool(capable.get("avx512_bf16") or capable.get("amx_bf16"))

@@ -1,0 +1,175 @@
+"""The novice Pi^N and its labels D^N: it acts and drops redundant labels; a network trains whenever m new are stored.
+
+The other novice there is learns from every label at once: `fusion/kernel_novice.py`.
+"""
+
+import copy
+import math
+import time
+from abc import ABC, abstractmethod
+from typing import Literal, Protocol
+
+from lira.fusion.learning.labels import is_rest
+from lira.fusion.learning.learner import Label, Weights
+from lira.fusion.policies.ensemble import EnsembleNet
+from lira.fusion.policies.networks import Network
+from lira.fusion.preprocess import Features
+from lira.hal.config import Table
+from lira.hal.messages import Action
+
+CATCH_UP_POLL_S = 0.005
+
+
+class LearningSettings(Table, frozen=True):
+    """How labels become a policy; fractions are of the action range.
+
+    An *idle frame* is a step with the dead-man held and the stick at rest. As a label it teaches to stand, which is
+    what was done; a person who only thinks for a moment may rather want it left out.
+    """
+
+    labels_per_step: int = 30  # m
+    redundancy: float = 0.05  # L
+    action_range: float = 2.0
+    filter_human: bool = True  # False keeps every human label
+    human_weight: float = 1.0  # of a human label's squared error
+    idle_frames: Literal["label", "skip"] = "label"
+
+
+class Trainer(Protocol):
+    """Where training happens: in this process or in one of its own."""
+
+    def add(self, label: Label) -> None:
+        """Hand over one label."""
+
+    def start(self, now_s: float) -> None:
+        """Begin one training step."""
+
+    def poll(self, now_s: float) -> Weights | None:
+        """Return new weights once they are there."""
+
+    @property
+    def pending(self) -> bool:
+        """Whether a training step is under way."""
+
+    def close(self) -> None:
+        """End the trainer, in bounded time."""
+
+
+def is_redundant(a: Action, a_n: Action, threshold: float) -> bool:
+    """Whether the novice already does it: every |a_k - a^N_k| < L (section III-C)."""
+    return all(abs(x - y) < threshold for x, y in zip(a, a_n, strict=True))
+
+
+class Novice(ABC):
+    """A policy under training. It changes between two steps, never during one."""
+
+    def __init__(self, settings: LearningSettings) -> None:
+        self.settings = settings
+        self.stored = 0
+        self.training_steps = 0  # finished ones
+
+    @property
+    def trained(self) -> bool:
+        """Whether the first training step is done."""
+        return self.training_steps > 0
+
+    @abstractmethod
+    def act(self, features: Features) -> Action:
+        """a^N as it is now."""
+
+    def alone(self, features: Features) -> Action:
+        """What it does when nobody teaches it any more: the same, unless a novice knows how it errs."""
+        return self.act(features)
+
+    def proving(self, features: Features) -> Action:
+        """The same in a run that proves it, from which it may learn what it knows."""
+        return self.alone(features)
+
+    def knows(self, features: Features, share: float) -> bool:  # noqa: ARG002
+        """Whether it is surer here than it was at all but that share of what a human had to show it; never if it
+        cannot tell.
+        """
+        return False
+
+    @abstractmethod
+    def remember(self, label: Label) -> None:
+        """Take in a label: a new one, or one that an earlier session stored."""
+
+    @abstractmethod
+    def frozen(self) -> Network:
+        """Return a copy of the policy as it drives alone, to be saved."""
+
+    def set_aside(self) -> list[tuple[int, str]]:
+        """Number and source of the labels it does not believe; none, unless a novice can tell."""
+        return []
+
+    def learn(self, features: Features, action: Action, source: str, a_n: Action) -> bool:
+        """Store a label unless it is redundant; `a_n` is the novice's own action there. Returns whether it was kept."""
+        threshold = self.settings.redundancy * self.settings.action_range
+        keep_always = source == "human" and not self.settings.filter_human
+        if not keep_always and is_redundant(action, a_n, threshold):
+            return False
+        self.remember(Label(features.scan, features.image, action, source, self.weight(source)))
+        return True
+
+    def leaves_out(self, human: Action) -> bool:
+        """Whether the human's action is an idle frame that is to be no label."""
+        return self.settings.idle_frames == "skip" and is_rest(human)
+
+    def weight(self, source: str) -> float:
+        """How much a label of this source counts."""
+        return self.settings.human_weight if source == "human" else 1.0
+
+    def update(self, now_s: float) -> None:  # noqa: B027 - who has learned already has nothing to adopt
+        """Adopt what training has brought, and begin what is due."""
+
+    def catch_up(self) -> None:  # noqa: B027
+        """Wait until everything that is due is learned."""
+
+    def close(self) -> None:  # noqa: B027
+        """End the training, in bounded time."""
+
+
+class NetworkNovice(Novice):
+    """A network, trained beside the loop. Weights are swapped between two steps."""
+
+    def __init__(self, network: Network, trainer: Trainer, settings: LearningSettings) -> None:
+        super().__init__(settings)
+        self.network = network
+        self._trainer = trainer
+        self._fresh = 0  # stored since the last training step that m labels brought began
+
+    def act(self, features: Features) -> Action:
+        """a^N of the current network."""
+        return self.network.act(features.scan, features.image)
+
+    def remember(self, label: Label) -> None:
+        """Hand a label to the trainer."""
+        self._trainer.add(label)
+        self.stored += 1
+        self._fresh += 1
+
+    def frozen(self) -> Network:
+        """Copy the network, without an ensemble that only doubts."""
+        network = copy.deepcopy(self.network)
+        return network.novice() if isinstance(network, EnsembleNet) else network
+
+    def update(self, now_s: float) -> None:
+        """Adopt weights that are ready; begin a training step if one is due: the remainder of m labels is carried."""
+        weights = self._trainer.poll(now_s)
+        if weights is not None:
+            self.network.load_weights(weights)
+            self.training_steps += 1
+        if not self._trainer.pending and self._fresh >= self.settings.labels_per_step:
+            self._fresh -= self.settings.labels_per_step
+            self._trainer.start(now_s)
+
+    def catch_up(self) -> None:
+        """Run the training steps that are due, one after the other, and wait for them. The remainder is carried."""
+        while self._trainer.pending or self._fresh >= self.settings.labels_per_step:
+            self.update(math.inf)
+            time.sleep(CATCH_UP_POLL_S if self._trainer.pending else 0.0)
+
+    def close(self) -> None:
+        """End the training, in bounded time."""
+        self._trainer.close()

@@ -1,0 +1,111 @@
+"""Writes down what happens at every step: the counts, the labels, the decision for the bus, the run record."""
+
+import time
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+
+from lira.fusion.control import Step
+from lira.fusion.log.counts import Ledger
+from lira.fusion.log.label_log import Demonstration
+from lira.fusion.log.run_log import Pose, Record, StepRecord
+from lira.fusion.methods.base import Call, Proposal
+from lira.hal.messages import Decision
+
+
+def _nowhere(_: object) -> None:
+    """Where a journal without a reader writes to."""
+
+
+class Journal:
+    """Turns steps into records and hands them on.
+
+    `keep` takes labels (the demonstration log), `write` run records, `publish` decisions. Labels go first: they are
+    what must not be lost.
+    """
+
+    def __init__(
+        self,
+        *,
+        keep: Callable[[Demonstration], None] = _nowhere,
+        write: Callable[[Record], None] = _nowhere,
+        publish: Callable[[Decision], None] = _nowhere,
+    ) -> None:
+        self.ledger = Ledger()
+        self.write = write
+        self._keep = keep
+        self._publish = publish
+        self._began_s = time.monotonic()
+        self._call = Call.NONE
+        self._reserved: dict[int, tuple[Proposal, Demonstration]] = {}  # the proposal too: so its id stays its own
+
+    @property
+    def elapsed_s(self) -> float:
+        """Wall-clock time since the journal was opened."""
+        return time.monotonic() - self._began_s
+
+    def note(self, step: Step, *, phase: str, lap: int, layout: int, training_steps: int) -> None:
+        """Record one step."""
+        choice, features = step.lesson.choice, step.proposal.features
+        self._keep_labels(step, lap)
+        if phase == "train":
+            demonstrating = step.proposal.choice.driver == "human"
+            self.ledger.note(step.lesson, now_s=step.observation.stamp_s, demonstrating=demonstrating)
+        decision = self._decision(step, phase, lap, training_steps)
+        self._publish(decision)
+        risen = choice.call not in (Call.NONE, self._call)
+        self._call = choice.call
+        self.write(
+            StepRecord(
+                decision,
+                state=None if step.state is None else Pose.of(step.state),
+                layout=layout,
+                label=choice.driver if step.lesson.stored else None,
+                image=(features.image * 255).round().astype(np.uint8).tobytes() if risen else None,
+                elapsed_s=self.elapsed_s,
+            )
+        )
+
+    def _keep_labels(self, step: Step, lap: int) -> None:
+        """Hand on the step's label, and those of earlier steps on which it was decided now."""
+        choice, features = step.lesson.choice, step.proposal.features
+        if choice.label is not None:
+            label = Demonstration(
+                stamp_s=step.observation.stamp_s,
+                observation=step.observation.seq,
+                lap=lap,
+                source=choice.driver,
+                action=choice.label,
+                novice=step.proposal.novice,
+                stored=step.lesson.stored,
+                scan=features.scan,
+                image=features.image,
+            )
+            if step.lesson.reserved:
+                self._reserved[id(step.proposal)] = step.proposal, label
+            else:
+                self._keep(label)
+        for settled in step.lesson.settled:
+            _, label = self._reserved.pop(id(settled.proposal))
+            self._keep(replace(label, stored=settled.stored))
+
+    def _decision(self, step: Step, phase: str, lap: int, training_steps: int) -> Decision:
+        choice, proposal = step.lesson.choice, step.proposal
+        return Decision(
+            stamp_s=step.observation.stamp_s,
+            observation=step.observation.seq,
+            driver=choice.driver,
+            call=str(choice.call),
+            executed=choice.action,
+            novice=proposal.novice,
+            human=choice.action if choice.driver == "human" else None,
+            experts=proposal.experts,
+            threshold=proposal.threshold,
+            labels=self.ledger.labels,
+            training_steps=training_steps,
+            interventions=self.ledger.interventions,
+            calls=self.ledger.calls,
+            phase=phase,
+            lap=lap,
+        )

@@ -1,0 +1,1 @@
+"""Who drives and what is learned: LIRA-SPF and its rivals."""

@@ -1,0 +1,85 @@
+"""The robot that stops and asks where it doubts, and HG-DAgger's doubt: how far an ensemble disagrees.
+
+d(O) = ||diag Cov_b[pi_b(O)]||_2 over the ensemble's policies pi_b. The threshold tau is the mean of the last quarter
+of the doubts that were logged when the human took over (Kelly et al., 2019).
+"""
+
+import math
+from collections.abc import Callable, Sequence
+
+import numpy as np
+
+from lira.fusion.methods.base import STAND, Call, Choice, Lesson, Policy, Proposal
+from lira.fusion.preprocess import Features
+from lira.hal.messages import Action, FloatArray
+
+Ensemble = Callable[[Features], FloatArray]
+"""What each policy of an ensemble would do: float32 [b, 2]."""
+
+LAST = 0.25  # the share of the log that counts
+
+
+def doubt(actions: FloatArray) -> float:
+    """d(O) of the actions [b, 2] that an ensemble proposes, b >= 2."""
+    return float(np.linalg.norm(np.var(actions.astype(np.float64), axis=0, ddof=1)))
+
+
+def threshold(doubts: Sequence[float]) -> float:
+    """tau: the mean of the last quarter of the logged doubts, at least one; +inf if nobody ever took over."""
+    if not doubts:
+        return math.inf
+    return float(np.mean(doubts[-math.ceil(LAST * len(doubts)) :]))
+
+
+class DoubtLog:
+    """What the ensemble thought whenever the human took over."""
+
+    def __init__(self, ensemble: Ensemble) -> None:
+        self._ensemble = ensemble
+        self.doubts: list[float] = []
+
+    def take_over(self, features: Features) -> None:
+        """Note the doubt at the moment of a take-over."""
+        self.doubts.append(self.doubt(features))
+
+    def doubt(self, features: Features) -> float:
+        """d(O)."""
+        return doubt(self._ensemble(features))
+
+    @property
+    def threshold(self) -> float:
+        """tau so far."""
+        return threshold(self.doubts)
+
+    def exceeds(self, features: Features) -> bool:
+        """Whether the doubt is above tau."""
+        return self.doubt(features) > self.threshold
+
+
+class Doubtful:
+    """A novice alone; where it `doubts` too much it stands and asks. Nothing is learned from the answer."""
+
+    def __init__(self, novice: Policy, doubts: Callable[[Features], bool]) -> None:
+        self._novice = novice
+        self._doubts = doubts
+
+    def reset(self) -> None:
+        """Nothing to forget."""
+
+    def update(self, now_s: float) -> None:
+        """Nothing to adopt."""
+
+    def propose(self, features: Features) -> Proposal:
+        """The novice's action, or to stand and call for feedback."""
+        a_n = self._novice(features)
+        if self._doubts(features):
+            return Proposal(features, Choice("novice", STAND, call=Call.FEEDBACK), a_n)
+        return Proposal(features, Choice("novice", a_n), a_n)
+
+    def learn(self, proposal: Proposal, human: Action | None) -> Lesson:
+        """Learn nothing."""
+        return Lesson(proposal.choice if human is None else Choice("human", human))
+
+    def policy(self, driver: str) -> Policy:
+        """What would drive from here on, standing included."""
+        return {"novice": lambda features: self.propose(features).choice.action}[driver]

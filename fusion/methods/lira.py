@@ -1,0 +1,144 @@
+"""LIRA-SPF: Algorithm 1 of the thesis, in its own symbols.
+
+Pi^1..Pi^n are the experts, Pi^N the novice, a actions in [-1, 1]^2 = (linear, angular), O the observation, S^i the last
+J actions of expert i, D^N the novice's labels. Line numbers are those of Algorithm 1.
+
+The printed algorithm asks "Pi^1 or Pi^2 is activated" before it asks for both, which makes the second branch
+unreachable; the text says "a single expert", and so does `choose`.
+"""
+
+from collections import deque
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Literal
+
+import numpy as np
+
+from lira.fusion.learning.novice import Novice
+from lira.fusion.methods.base import STAND, Call, Choice, Expert, Lesson, Policy, Proposal
+from lira.fusion.preprocess import Features
+from lira.hal.config import Table
+from lira.hal.messages import Action, ExpertView
+
+
+class LiraSettings(Table, frozen=True, tag="lira"):
+    """The thresholds, as fractions of the action range, and what the thesis leaves open.
+
+    `hold` (not in the thesis) also counts an expert as active while its action is further than this from its cruise
+    action: an expert in a constant hard turn has no standard deviation and would fall "inactive" in mid-manoeuvre.
+    """
+
+    theta: float = 0.03  # activation threshold
+    consensus: float = 0.10  # T
+    action_range: float = 2.0  # high - low
+    memory_s: float = 1.0  # J, in time
+    slow_down: float = 0.3  # speed factor while feedback is called for (assumed)
+    hold: float | None = 0.2
+    start: Literal["human", "experts"] = "human"  # who drives before the first training step
+
+
+PRESETS = {"hold": LiraSettings(), "thesis": LiraSettings(hold=None)}
+
+
+def activation(s_i: Sequence[Action]) -> float:
+    """A^i: the population standard deviation of the last J actions, summed over their dimensions (eq. 1)."""
+    return float(np.std(np.asarray(s_i), axis=0).sum())
+
+
+def in_consensus(actions: Sequence[Action], threshold: float) -> bool:
+    """Whether every |a^i_k - a^j_k| < T over all pairs (eq. 2): the same as max - min < T in each dimension."""
+    return bool((np.ptp(np.asarray(actions), axis=0) < threshold).all())
+
+
+def mean(actions: Sequence[Action]) -> Action:
+    """Mean action."""
+    linear, angular = np.mean(np.asarray(actions), axis=0)
+    return float(linear), float(angular)
+
+
+def choose(human: Action | None, experts: Sequence[ExpertView], a_n: Action, threshold: float) -> Choice:
+    """Lines 7 to 23: who drives, what is learned, and who is called."""
+    active = [expert for expert in experts if expert.active]
+    if human is not None:  # lines 7 to 9
+        return Choice("human", human, label=human)
+    if not active:  # lines 22, 23
+        return Choice("novice", a_n)
+    if len(active) == 1:  # lines 10 to 13
+        return Choice(active[0].name, active[0].action, label=active[0].action, call=Call.ATTENTION)
+    actions = [expert.action for expert in active]
+    if in_consensus(actions, threshold):  # lines 14 to 18
+        return Choice("mean", mean(actions), label=mean(actions))
+    return Choice("novice", a_n, call=Call.FEEDBACK)  # lines 19 to 21; slowed down
+
+
+class LiraSpf:
+    """Learning Interactively to Resolve Ambiguity in Sensor Policy Fusion."""
+
+    def __init__(self, experts: Sequence[Expert], novice: Novice, settings: LiraSettings, period_s: float) -> None:
+        if len(experts) < 2:
+            raise ValueError("LIRA-SPF needs at least two experts")
+        self.experts = experts
+        self.novice = novice
+        self.settings = settings
+        self._j = max(2, round(settings.memory_s / period_s))
+        self.reset()
+
+    def reset(self) -> None:
+        """Line 1: S is empty, so nobody is active until it holds J actions."""
+        self._s: list[deque[Action]] = [deque(maxlen=self._j) for _ in self.experts]
+
+    def update(self, now_s: float) -> None:
+        """Line 25, with the training itself elsewhere."""
+        self.novice.update(now_s)
+
+    def propose(self, features: Features) -> Proposal:
+        """Lines 3 to 6 and 10 to 23: what to execute unless the human gives feedback."""
+        a = [expert.act(features) for expert in self.experts]  # line 4
+        a_n = self.novice.act(features)
+        for s_i, a_i in zip(self._s, a, strict=True):  # line 5, also while the human drives
+            s_i.append(a_i)
+        views = tuple(self._view(*each) for each in zip(self.experts, self._s, a, strict=True))  # line 6
+        choice = choose(None, views, a_n, self._consensus) if self.novice.trained else self._beginning(a)
+        speed = self.settings.slow_down if choice.call is Call.FEEDBACK else 1.0
+        return Proposal(features, choice, a_n, views, self._theta, speed)
+
+    def learn(self, proposal: Proposal, human: Action | None) -> Lesson:
+        """Lines 7 to 9, and the labels of lines 13 and 18."""
+        choice = proposal.choice
+        if human is not None:
+            choice = choose(human, proposal.experts, proposal.novice, self._consensus)
+            if self.novice.leaves_out(human):
+                choice = replace(choice, label=None)
+        if choice.label is None:
+            return Lesson(choice)
+        return Lesson(choice, self.novice.learn(proposal.features, choice.label, choice.driver, proposal.novice))
+
+    def policy(self, driver: str) -> Policy:
+        """The policy behind a driver's name."""
+        if driver == "novice":
+            return self.novice.act
+        if driver == "mean":
+            return lambda features: mean([expert.act(features) for expert in self.experts])
+        return {expert.name: expert.act for expert in self.experts}[driver]
+
+    @property
+    def _theta(self) -> float:
+        return self.settings.theta * self.settings.action_range
+
+    @property
+    def _consensus(self) -> float:
+        return self.settings.consensus * self.settings.action_range
+
+    def _view(self, expert: Expert, s_i: Sequence[Action], a_i: Action) -> ExpertView:
+        """Line 6: an expert is active if its actions change, or if it holds one away from its cruise."""
+        full = len(s_i) == self._j
+        strength = activation(s_i) if full else 0.0
+        hold = self.settings.hold
+        holds = hold is not None and not in_consensus([a_i, expert.cruise], hold)
+        return ExpertView(expert.name, a_i, strength, full and (strength > self._theta or holds))
+
+    def _beginning(self, a: Sequence[Action]) -> Choice:
+        """Before the first training step the novice knows nothing: the human is asked to drive."""
+        if self.settings.start == "experts":
+            return Choice("mean", mean(a), label=mean(a))
+        return Choice("human", STAND, call=Call.FEEDBACK)

@@ -1,0 +1,1 @@
+"""The scripted teacher, and the course of a session with it."""

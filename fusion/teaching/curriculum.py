@@ -1,0 +1,115 @@
+"""What each task's two experts are trained on: the world, the drives, and how strict the teacher is."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import msgspec
+
+from lira.fusion.experts.tasks import DEFAULT, TASKS
+from lira.fusion.teaching.session import Drive
+from lira.fusion.teaching.teacher import PERFECT, SKILLED, TeacherSettings
+from lira.hal.messages import Episode
+
+
+@dataclass(frozen=True, slots=True)
+class Curriculum:
+    """A training course for one single-sensor expert.
+
+    `cruise_world` shows the sensor nothing for the first `cruise_steps`: the cruise action is measured there.
+    """
+
+    world: str
+    teacher: TeacherSettings
+    drives: tuple[Drive, ...]
+    laps: int
+    cruise_world: str = "straight"
+    cruise_steps: int = 25
+
+
+STRICT = msgspec.structs.replace(PERFECT, style="proportional")  # experts are to be good: shown without faults
+
+
+def _line_camera(teacher: TeacherSettings) -> Curriculum:
+    """A lap of the curved line, then starts beside it and askew: the expert has to find its way back (fig. E.2b)."""
+    askew = [(0.5, -0.3), (-0.5, 0.3), (0.9, -0.6), (-0.9, 0.6), (0.9, 0.0), (-0.9, 0.0), (0.3, 0.5), (-0.3, -0.5)]
+    recoveries = [
+        Drive(Episode(0, start_m=3.0 + 4.0 * k, lateral_m=lateral, yaw_rad=yaw), 8.0, "stay", final_lateral_m=0.35)
+        for k, (lateral, yaw) in enumerate(askew)
+    ]
+    teacher = msgspec.structs.replace(teacher, lateral_m=0.2)
+    return Curriculum("line", teacher, (Drive(Episode(0), 300.0), *recoveries), laps=12)
+
+
+def _line_lidar() -> Curriculum:
+    """Forests from sparse to dense, straight on until something is in the way (fig. E.1)."""
+    teacher = msgspec.structs.replace(STRICT, margin_m=0.2, horizon_s=2.0, follow_line=False)
+    askew = [(0.15, 0.0), (-0.15, 0.0), (0.3, 0.1), (-0.3, -0.1), (0.0, 0.2), (0.0, -0.2)]
+    drives = tuple(
+        Drive(Episode(layout, lateral_m=lateral, yaw_rad=yaw), 60.0, "stay")
+        for layout, (lateral, yaw) in enumerate(askew * 3)
+    )
+    return Curriculum("forest", teacher, drives, laps=12)
+
+
+def _passage() -> Curriculum:
+    """Openings, corridors, walls and boxes, the same for both sensors; straight on where there are none (fig. 6).
+
+    Each from a few metres before it: nothing on the open floor between them tells a sensor which way leads on.
+    """
+    teacher = msgspec.structs.replace(STRICT, margin_m=0.15, lateral_m=1.5, stray_m=0.3)
+    places = ((10.5, 4.5), (15.3, 7.0), (29.0, 7.3), (37.8, 5.0), (43.5, 7.0), (51.0, 4.5))
+    through = [
+        Drive(Episode(0, start_m=start, lateral_m=lateral), limit_s, "stay", final_lateral_m=0.8)
+        for lateral in (0.0, 0.15, -0.15)
+        for start, limit_s in places
+    ]
+    around = [Drive(Episode(layout, start_m=start), 6.0, "stay") for layout in range(2) for start in (1.0, 22.0)]
+    open_floor = [Drive(Episode(0, start_m=start), 2.5, "stay", final_lateral_m=0.25) for start in (0.0, 56.0)]
+    drives = (*open_floor, *through, *around)
+    return Curriculum("passage-train", teacher, drives, laps=20, cruise_world="passage", cruise_steps=10)
+
+
+def _garden_camera() -> Curriculum:
+    """Along the steel edge without the box, from the start and from beside the way (fig. 14)."""
+    return _edge("garden-train", askew=[(0.2, -0.2), (-0.15, 0.2), (0.3, 0.0), (-0.15, 0.0)], starts=(1.0, 6.0))
+
+
+def _garden_lidar() -> Curriculum:
+    """Put before boxes in the open, nearer and farther to either side (fig. F.1)."""
+    teacher = msgspec.structs.replace(STRICT, margin_m=0.15, horizon_s=3.0, follow_line=False)
+    places = [(2.8, 0.1), (2.8, -0.1), (3.0, 0.25), (3.0, -0.25), (2.6, 0.4), (2.6, -0.4)]
+    drives = tuple(
+        Drive(Episode(layout, start_m=start, lateral_m=lateral), 30.0, "stay")
+        for layout, (start, lateral) in enumerate(places)
+    )
+    return Curriculum("forest", teacher, drives, laps=12)
+
+
+def _corridor_camera() -> Curriculum:
+    """Down the middle of the corridor, with white spots alone on its floor (fig. F.2a)."""
+    return _edge("corridor-train", askew=[(0.4, 0.0), (-0.4, 0.0), (0.3, 0.3), (-0.3, -0.3)], starts=(4.0,))
+
+
+def _edge(world: str, askew: Sequence[tuple[float, float]], starts: Sequence[float]) -> Curriculum:
+    """Back to the way from places and headings beside it, then all of it, at the real robot's pace."""
+    teacher = msgspec.structs.replace(STRICT, lateral_m=0.2, stray_m=0.2)
+    recoveries = [
+        Drive(Episode(k, start_m=start, lateral_m=lateral, yaw_rad=yaw), 10.0, "stay", final_lateral_m=0.2)
+        for start in starts
+        for k, (lateral, yaw) in enumerate(askew)
+    ]
+    return Curriculum(world, teacher, (*recoveries, Drive(Episode(0), 240.0)), laps=12, cruise_world=world)
+
+
+CURRICULA = {
+    DEFAULT: {"camera": _line_camera(STRICT), "lidar": _line_lidar()},
+    "eight": {"camera": _line_camera(SKILLED)},  # Appendix C is about an expert taught as a person does: bang-bang
+    "passage": {"camera": _passage(), "lidar": _passage()},
+    "garden": {"camera": _garden_camera(), "lidar": _garden_lidar()},
+    "corridor": {"camera": _corridor_camera()},
+}
+
+
+def curriculum(kind: str, task: str) -> Curriculum:
+    """Return what a task's expert is trained on; a lidar expert may be another task's, see `Task`."""
+    return CURRICULA[TASKS[task].lidar if kind == "lidar" else task][kind]

@@ -1,0 +1,1 @@
+"""A robot at the other end of the bus."""

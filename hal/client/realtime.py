@@ -1,0 +1,255 @@
+"""A client's side of a robot in real time: it estimates the robot's clock and keeps decisions alive between decisions.
+
+Decisions come at 5 Hz and the robot stops after 0.25 s without a command, so a decision is sent again at 20 Hz. Two
+ages bound that. The robot judges when a command was last sent: a process that dies stops the robot one time-out after
+its last message. This side judges when it was decided: a loop that hangs is kept alive for 0.5 s, and the robot stops
+one time-out later. A person's hand is not a decision (it answers no observation): it streams by itself, is judged by
+its own stamp and never repeated.
+
+A robot that is started anew has another clock: nothing that was stamped before is kept, and as it has stopped by
+itself, the first neutral decision is answered here instead of arming it.
+"""
+
+import math
+import threading
+import time
+from collections.abc import Callable
+from dataclasses import replace
+
+from lira.hal.bus.bus import Bus, Publisher
+from lira.hal.bus.clock import ClockEstimate
+from lira.hal.bus.topics import APPLIED, CMD_VEL, SIM_STATE, TELEOP
+from lira.hal.client.sensor_reader import Sense, Senses
+from lira.hal.errors import BusError
+from lira.hal.messages import HELD, STOP, Applied, Command, CourseState, Observation, Reason, Source, Twist
+from lira.hal.safety.governor import is_neutral
+from lira.hal.safety.lease import session_of
+
+REPEAT_HZ = 20.0
+DECISION_S = 0.5  # age at which a decision is no longer sent
+ANSWER_S = 0.05
+POLL_S = 0.002
+NAP_S = 0.02
+NOBODY = -1
+HEAR_S = 5.0
+MOMENT_S = 0.5
+FAREWELL = 3  # neutral commands at the end: one may be lost
+
+
+class RealTimeLink:
+    """Talks to a robot whose time passes by itself, and that stops when policy is silent for `patience_s`."""
+
+    def __init__(self, bus: Bus, patience_s: float) -> None:
+        self._patience_s = patience_s
+        self._senses = Senses(bus)
+        self._states = Sense(bus, SIM_STATE)
+        self._results = bus.reader(APPLIED, depth=16)
+        self._publishers = {Source.POLICY: bus.publisher(CMD_VEL), Source.TELEOP: bus.publisher(TELEOP)}
+        self._clock = ClockEstimate()
+        self._epoch = NOBODY  # of the robot that is listened to
+        self._own = session_of(bus.epoch)
+        self._newest: Applied | None = None
+        self._untold = False  # the robot has stopped by itself, and whoever drives here has not heard of it
+        self._held: dict[Source, Command] = {}
+        self._repeat_s = 0.0
+        self._boundary = bus.boundary
+        # Over the order of what is sent, which a link may hold up; taken before the other one.
+        self._sending = threading.Lock()
+        # Over the clock, the held decisions and what came back: never held while something is sent.
+        self._heard = threading.Condition()
+        self._stop = threading.Event()
+        self._threads = [
+            threading.Thread(target=self._run, args=[work, topic.key], name=f"remote-{name}", daemon=True)
+            for name, work, topic in (("listen", self._listen, APPLIED), ("repeat", self._repeat, CMD_VEL))
+        ]
+
+    @property
+    def epoch(self) -> int:
+        """Which start of the robot is listened to: its session's number. Times from before mean nothing after it."""
+        return self._epoch
+
+    def start(self) -> None:
+        """Listen until the robot's clock is known. Raises `BusError` if it says nothing."""
+        for thread in self._threads:
+            thread.start()
+        deadline_s = time.monotonic() + HEAR_S
+        while not self._clock.known:
+            if time.monotonic() > deadline_s:
+                raise BusError("the robot says nothing about its wheels", "Look whether it still runs.")
+            time.sleep(POLL_S)
+
+    def stand(self) -> None:
+        """Have the robot stand until the next decision: what was decided before a reset does not drive after it."""
+        with self._sending:
+            with self._heard:
+                now_s = self._clock.now(time.monotonic())
+                for source, command in self._held.items():
+                    self._held[source] = replace(command, twist=STOP, stamp_s=now_s)
+                due = self._due(now_s, *self._held)
+            self._send(due, now_s)
+
+    def refresh(self, reset_s: float) -> None:
+        """Forget what was captured before a reset, and wait a moment for what comes after it."""
+        before = self.read()
+        self._senses.forget(reset_s)
+        self._states.forget(reset_s)
+        deadline_s = time.monotonic() + MOMENT_S
+        while not _has_all(before, self.read()) and time.monotonic() < deadline_s:
+            time.sleep(POLL_S)
+
+    def now(self) -> float:
+        """Seconds on the robot's clock, as estimated."""
+        with self._heard:
+            return self._clock.now(time.monotonic())
+
+    def read(self) -> Observation:
+        """Return the newest of every sensor that is fresh."""
+        return self._senses.observe(self.now())
+
+    def state(self) -> CourseState | None:
+        """Ground truth, None if none comes within a moment."""
+        deadline_s = time.monotonic() + MOMENT_S
+        while (state := self._states.read(self.now())) is None and time.monotonic() < deadline_s:
+            time.sleep(POLL_S)
+        return state
+
+    def drive(self, command: Command) -> Applied:
+        """Send a command and wait a moment for what the robot says it applied on it.
+
+        Returns what it said last if that does not come in time, a stop if it has not said anything lately. A neutral
+        decision is not sent while the robot may have stopped by itself without a word here, nor once it has and the
+        caller does not know (this call tells): it would arm the robot, and nobody has decided that.
+        """
+        decided = command.source is Source.POLICY or command.answers >= 0
+        with self._sending:
+            with self._heard:
+                now_s = self._clock.now(time.monotonic())
+                if decided and self._would_arm_blindly(now_s, command):
+                    told = self._newest if self._untold else None
+                    self._untold = False
+                    self._held.pop(command.source, None)  # what was decided before holds no more
+                    if told is not None and told.reason in HELD:
+                        return told
+                    return Applied(STOP, now_s, reason=Reason.STALE)
+                if decided:
+                    self._held[command.source] = command
+                due = self._due(now_s, command.source) if decided else [command]
+            self._send(due, now_s if decided else command.stamp_s)
+        with self._heard:
+            self._heard.wait_for(lambda: _results_from(self._newest, command, now_s), ANSWER_S)
+            newest = self._newest
+            if newest is None or now_s - newest.stamp_s > APPLIED.max_age_s:
+                return Applied(STOP, now_s)
+            self._untold = False
+        if Source.POLICY == command.source == newest.source and newest.session != self._own:
+            return Applied(STOP, newest.stamp_s, reason=Reason.REFUSED)  # somebody else drives
+        return newest
+
+    def wait(self, until_s: float) -> None:
+        """Sleep until the robot's clock says so, or the robot is started anew and its clock with it."""
+        epoch = self._epoch
+        while self._epoch == epoch and (left_s := until_s - self.now()) > 0:
+            time.sleep(min(left_s, NAP_S))
+
+    def close(self) -> None:
+        """Say stop, and fall silent."""
+        self._stop.set()
+        if self._threads[0].is_alive():
+            for thread in self._threads:
+                thread.join()
+            self._held.clear()
+            for _ in range(FAREWELL):
+                _put(self._publishers[Source.POLICY], Command(STOP, 0.0, released=True), self.now())
+
+    def _run(self, work: Callable[[], None], key: str) -> None:
+        while not self._stop.wait(POLL_S):
+            try:
+                with self._boundary.guard(key):
+                    work()
+            except BusError:
+                return  # the bus was closed first: whoever drives or reads hears of it
+
+    def _listen(self) -> None:
+        for received in self._results.poll():
+            attachment = received.attachment
+            if attachment is None:
+                continue
+            with self._heard:
+                if not self._clock.hear(attachment.epoch, attachment.time_s, received.arrived_s):
+                    continue
+                if attachment.epoch != self._epoch:
+                    self._begin_anew(attachment.epoch)
+                self._note_stop(received.message)
+                self._newest = received.message
+                self._heard.notify_all()
+
+    def _begin_anew(self, epoch: int) -> None:
+        """Listen to a robot that was started. What was decided on another clock is not said to this one."""
+        self._untold = self._epoch != NOBODY
+        self._epoch = epoch
+        self._held.clear()
+        self._newest = None
+        self._repeat_s = 0.0
+        self._senses.restart(epoch)
+        self._states.restart(epoch)
+
+    def _note_stop(self, applied: Applied) -> None:
+        """Notice when the robot stops by itself. One that nobody has commanded yet has not moved since."""
+        if applied.reason is Reason.NO_COMMAND:
+            return
+        if applied.reason not in HELD:
+            self._untold = False
+        elif self._newest is not None and self._newest.reason not in HELD:
+            self._untold = True
+
+    def _repeat(self) -> None:
+        with self._sending:
+            with self._heard:
+                if not self._clock.known or (now_s := self._clock.now(time.monotonic())) < self._repeat_s:
+                    return
+                self._repeat_s = now_s + 1.0 / REPEAT_HZ
+                due = self._due(now_s, *self._held)
+            self._send(due, now_s)
+
+    def _would_arm_blindly(self, now_s: float, command: Command) -> bool:
+        """Whether this is neutral, and the robot has stopped, or may have lost patience since it was last heard."""
+        newest = self._newest
+        if newest is None or command.released or not is_neutral(command.twist):
+            return False
+        age_s = 0.0 if math.isnan(newest.command_age_s) else newest.command_age_s
+        return self._untold or now_s - newest.stamp_s + age_s > self._patience_s
+
+    def _due(self, now_s: float, *sources: Source) -> list[Command]:
+        """The decisions that are still to be sent; lets go of what is too old."""
+        due = []
+        for command in [self._held[source] for source in sources]:
+            if now_s - command.stamp_s > DECISION_S or self._would_arm_blindly(now_s, command):
+                del self._held[command.source]
+            else:
+                due.append(command)
+        return due
+
+    def _send(self, commands: list[Command], time_s: float) -> None:
+        for command in commands:
+            _put(self._publishers[command.source], command, time_s)
+
+
+def _has_all(before: Observation, after: Observation) -> bool:
+    """Whether every sensor that spoke before speaks again."""
+    pairs = ((before.scan, after.scan), (before.image, after.image), (before.odom, after.odom))
+    return all(new is not None for old, new in pairs if old is not None)
+
+
+def _results_from(applied: Applied | None, command: Command, sent_s: float) -> bool:
+    """Whether this was applied after the command came: the command itself, a hand that overruled it, or a stop."""
+    if applied is None or applied.stamp_s < sent_s:
+        return False
+    return (
+        applied.source is not Source.POLICY
+        or command.source is not Source.POLICY
+        or (applied.answers == command.answers)
+    )
+
+
+def _put(publisher: Publisher[Twist], command: Command, time_s: float) -> None:
+    publisher.put(command.twist, time_s, answers=command.answers, released=command.released)

@@ -1,0 +1,73 @@
+"""Our own messages about learning: decisions, and a twin's ground truth."""
+
+import math
+from typing import Any
+
+import numpy as np
+
+from lira.hal.messages import Action, CourseState, Decision, ExpertView, LabelCounts
+from lira.hal.messages.ros_types import Codec, header, ros, stamp
+
+_COURSE_FIELDS = tuple(CourseState.__dataclass_fields__)[1:]
+_COUNT_FIELDS = tuple(LabelCounts.__dataclass_fields__)
+
+
+def _course_to(m: CourseState) -> Any:
+    values = [getattr(m, name) for name in _COURSE_FIELDS]
+    return ros("lira_msgs/msg/CourseState")(header(m.stamp_s, "odom"), *values)
+
+
+def _course_from(message: Any) -> CourseState:
+    return CourseState(stamp(message), *(getattr(message, name) for name in _COURSE_FIELDS))
+
+
+def _action_from(values: Any) -> Action:
+    return float(values[0]), float(values[1])
+
+
+def _decision_to(m: Decision) -> Any:
+    expert = ros("lira_msgs/msg/ExpertView")
+    return ros("lira_msgs/msg/Decision")(
+        header=header(m.stamp_s, "base_link"),
+        observation=m.observation,
+        driver=m.driver,
+        call=m.call,
+        executed=np.array(m.executed, np.float64),
+        novice=np.array(m.novice, np.float64),
+        has_human=m.human is not None,
+        human=np.array(m.human or (math.nan, math.nan), np.float64),
+        experts=[expert(e.name, np.array(e.action, np.float64), e.activation, e.active) for e in m.experts],
+        threshold=m.threshold,
+        labels=ros("lira_msgs/msg/LabelCounts")(*(getattr(m.labels, name) for name in _COUNT_FIELDS)),
+        training_steps=m.training_steps,
+        interventions=m.interventions,
+        calls=m.calls,
+        phase=m.phase,
+        lap=m.lap,
+    )
+
+
+def _decision_from(message: Any) -> Decision:
+    return Decision(
+        stamp_s=stamp(message),
+        observation=message.observation,
+        driver=message.driver,
+        call=message.call,
+        executed=_action_from(message.executed),
+        novice=_action_from(message.novice),
+        human=_action_from(message.human) if message.has_human else None,
+        experts=tuple(ExpertView(e.name, _action_from(e.action), e.activation, e.active) for e in message.experts),
+        threshold=message.threshold,
+        labels=LabelCounts(*(getattr(message.labels, name) for name in _COUNT_FIELDS)),
+        training_steps=message.training_steps,
+        interventions=message.interventions,
+        calls=message.calls,
+        phase=message.phase,
+        lap=message.lap,
+    )
+
+
+CODECS: dict[type, Codec] = {
+    CourseState: Codec("lira_msgs/msg/CourseState", _course_to, _course_from),
+    Decision: Codec("lira_msgs/msg/Decision", _decision_to, _decision_from),
+}

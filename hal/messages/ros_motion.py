@@ -1,0 +1,100 @@
+"""Velocities and where they lead: Twist with and without a stamp, what was applied, odometry, IMU."""
+
+from typing import Any
+
+import numpy as np
+
+from lira.hal.messages import Applied, Imu, Odometry, Reason, Source, Twist, TwistStamped
+from lira.hal.messages.ros_types import Codec, Vector3, header, ros, stamp, twist_from, twist_to, yaw_from, yaw_to
+
+_Point = ros("geometry_msgs/msg/Point")
+_Pose = ros("geometry_msgs/msg/Pose")
+_PoseWithCovariance = ros("geometry_msgs/msg/PoseWithCovariance")
+_TwistWithCovariance = ros("geometry_msgs/msg/TwistWithCovariance")
+
+_NO_COVARIANCE_36 = np.zeros(36)
+_NO_COVARIANCE_9 = np.zeros(9)
+
+
+def _stamped_to(m: TwistStamped) -> Any:
+    return ros("geometry_msgs/msg/TwistStamped")(header(m.stamp_s, "base_link"), twist_to(m.twist))
+
+
+def _stamped_from(message: Any) -> TwistStamped:
+    return TwistStamped(stamp(message), twist_from(message.twist))
+
+
+def _applied_to(m: Applied) -> Any:
+    return ros("lira_msgs/msg/Applied")(
+        header(m.stamp_s, "base_link"),
+        twist_to(m.twist),
+        m.source.value,
+        m.reason.value,
+        list(m.clamps),
+        m.answers,
+        m.command_age_s,
+        m.session,
+        m.seq,
+        m.commander,
+    )
+
+
+def _applied_from(message: Any) -> Applied:
+    return Applied(
+        twist_from(message.twist),
+        stamp(message),
+        Source(message.source),
+        Reason(message.reason),
+        tuple(message.clamps),
+        message.answers,
+        message.command_age_s,
+        message.session,
+        message.seq,
+        message.commander,
+    )
+
+
+def _odometry_to(m: Odometry) -> Any:
+    pose = _Pose(_Point(m.x_m, m.y_m, 0.0), yaw_to(m.yaw_rad))
+    twist = twist_to(Twist(m.linear_m_s, m.angular_rad_s))
+    return ros("nav_msgs/msg/Odometry")(
+        header(m.stamp_s, "odom"),
+        "base_link",
+        _PoseWithCovariance(pose, _NO_COVARIANCE_36),
+        _TwistWithCovariance(twist, _NO_COVARIANCE_36),
+    )
+
+
+def _odometry_from(message: Any) -> Odometry:
+    pose, twist = message.pose.pose, message.twist.twist
+    return Odometry(
+        stamp(message), pose.position.x, pose.position.y, yaw_from(pose.orientation), twist.linear.x, twist.angular.z
+    )
+
+
+def _imu_to(m: Imu) -> Any:
+    return ros("sensor_msgs/msg/Imu")(
+        header(m.stamp_s, "imu_link"),
+        yaw_to(m.yaw_rad),
+        _NO_COVARIANCE_9,
+        Vector3(0.0, 0.0, m.angular_rad_s),
+        _NO_COVARIANCE_9,
+        Vector3(m.linear_m_s2, m.lateral_m_s2, 0.0),
+        _NO_COVARIANCE_9,
+    )
+
+
+def _imu_from(message: Any) -> Imu:
+    acceleration = message.linear_acceleration
+    return Imu(
+        stamp(message), yaw_from(message.orientation), message.angular_velocity.z, acceleration.x, acceleration.y
+    )
+
+
+CODECS: dict[type, Codec] = {
+    Twist: Codec("geometry_msgs/msg/Twist", twist_to, twist_from),
+    TwistStamped: Codec("geometry_msgs/msg/TwistStamped", _stamped_to, _stamped_from),
+    Applied: Codec("lira_msgs/msg/Applied", _applied_to, _applied_from),
+    Odometry: Codec("nav_msgs/msg/Odometry", _odometry_to, _odometry_from),
+    Imu: Codec("sensor_msgs/msg/Imu", _imu_to, _imu_from),
+}

@@ -1,0 +1,1 @@
+"""Puts a robot on the bus."""

@@ -1,0 +1,1 @@
+"""Teach a mobile robot by interaction: single-sensor experts and a person train a fused policy (LIRA-SPF)."""

@@ -1,0 +1,1 @@
+"""The experiments of the registry, one module each."""

@@ -1,0 +1,72 @@
+"""Writing the file of a pad by watching which control moves. Pure."""
+
+from dataclasses import dataclass
+
+from lira.tools.joystick.axes import PadState
+from lira.tools.joystick.codes import AXES, AXIS_NAMES, BUTTON_NAMES, BUTTONS
+from lira.tools.joystick.mapping import Axis
+
+MOVED = 0.7  # share of an axis's way from where it rested
+
+
+@dataclass(frozen=True, slots=True)
+class Ask:
+    """One question: the key it fills, what to say, whether an axis answers it, and whether it may go unanswered."""
+
+    key: str
+    words: str
+    is_axis: bool = False
+    optional: bool = False
+
+
+ASKS = (
+    Ask("forward", "push the stick that drives all the way FORWARD, hold it", is_axis=True),
+    Ask("turn", "push the stick that turns all the way LEFT, hold it", is_axis=True),
+    Ask("dead_man", "press the DEAD-MAN (a shoulder button: you drive while you hold it)"),
+    Ask("turbo", "press TURBO (another shoulder button)"),
+    Ask("estop", "press the EMERGENCY STOP (one that you find without looking)"),
+    Ask("release", "press the button that RELEASES the emergency stop when held"),
+    Ask("pause", "press the button that PAUSES driving and learning, or wait to do without", optional=True),
+    Ask("save", "press the button that SAVES what was learned, or wait to do without", optional=True),
+    Ask("reset", "press the button that begins a new EPISODE when held, or wait to do without", optional=True),
+)
+
+
+def moved_axis(rest: PadState, now: PadState) -> Axis | None:
+    """The axis that went furthest from rest, if far enough; the robot's positive is where it was pushed."""
+    ways = {name: now.reads(name) - rest.reads(name) for name, code in AXES.items() if code in now.axes}
+    name = max(ways, key=lambda name: abs(ways[name]), default=None)
+    if name is None or abs(ways[name]) < MOVED:
+        return None
+    return Axis(axis=name, inverted=ways[name] < 0.0)
+
+
+def pressed_button(rest: PadState, now: PadState) -> str | None:
+    """The button that is pressed now and was not at rest; one that we have no name for does not count."""
+    return next((BUTTON_NAMES[code] for code in sorted(now.pressed - rest.pressed) if code in BUTTON_NAMES), None)
+
+
+def to_toml(name: str, found: dict[str, Axis | str], axes: frozenset[int], buttons: frozenset[int]) -> str:
+    """The file: what was found by key, and every control in the order of its number for `joy`."""
+    lines = [f"name = {_quoted(name)}"]
+    for ask in ASKS:
+        if ask.key not in found:
+            continue
+        value = found[ask.key]
+        if isinstance(value, Axis):
+            lines.append(f'{ask.key} = {{ axis = "{value.axis}", inverted = {str(value.inverted).lower()} }}')
+        else:
+            lines.append(f'{ask.key} = ["{value}"]' if ask.key == "estop" else f'{ask.key} = "{value}"')
+    lines.append(f"axes = [{_names(AXES, axes)}]")
+    lines.append(f"buttons = [{_names(BUTTONS, buttons)}]")
+    return "\n".join(lines) + "\n"
+
+
+def _names(names: dict[str, int], codes: frozenset[int]) -> str:
+    known = {**AXIS_NAMES, **BUTTON_NAMES}
+    return ", ".join(f'"{known[code]}"' for code in sorted(codes & set(names.values())))
+
+
+def _quoted(text: str) -> str:
+    printable = "".join(c for c in text if c.isprintable()).replace("\\", "\\\\").replace('"', '\\"')
+    return f'"{printable}"'

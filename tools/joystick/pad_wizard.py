@@ -1,0 +1,77 @@
+"""`lira joystick --learn`: ask for each control, watch the pad, write its file."""
+
+import select
+import time
+from pathlib import Path
+
+from lira.hal.config import write_whole
+from lira.hal.errors import DeviceError, StorageError
+from lira.tools.joystick.axes import PadState
+from lira.tools.joystick.mapping import Axis
+from lira.tools.joystick.nodes import Node, is_any_pad, read_nodes
+from lira.tools.joystick.pad import Pad
+from lira.tools.joystick.pad_detect import ASKS, Ask, moved_axis, pressed_button, to_toml
+
+ANSWER_S, OPTIONAL_S = 30.0, 8.0
+LOOK_S = 0.1
+
+
+def learn(path: Path, device: str | None) -> int:
+    """Ask, and write the file. Raises `DeviceError` without a pad or an answer, `StorageError` for the file."""
+    if path.exists():
+        raise StorageError(f"{path} is already there", "Choose another file name.")
+    node = _find(device)
+    pad = Pad(node)
+    print(f"{node}: leave it at rest now", flush=True)
+    found: dict[str, Axis | str] = {}
+    try:
+        for ask in ASKS:
+            rest = pad.state
+            print(f"  {ask.words} ... ", end="", flush=True)
+            answer = _answer(pad, rest, ask, taken=list(found.values()))
+            if answer is None:
+                print("none", flush=True)
+                continue
+            found[ask.key] = answer
+            print(answer.axis if isinstance(answer, Axis) else answer, flush=True)
+            _wait_for_rest(pad, rest, answer)
+    finally:
+        pad.close()
+    write_whole(path, to_toml(node.name, found, node.axes, node.buttons).encode())
+    print(f"written: {path}; use it with: lira joystick --pad {path}")
+    return 0
+
+
+def _find(device: str | None) -> Node:
+    nodes = [node for node in read_nodes() if is_any_pad(node) and device in (None, node.path)]
+    if not nodes:
+        raise DeviceError("no pad is there", "Plug one in, or press its PS button; see /proc/bus/input/devices.")
+    return nodes[0]
+
+
+def _answer(pad: Pad, rest: PadState, ask: Ask, taken: list[Axis | str]) -> Axis | str | None:
+    names = [other.axis if isinstance(other, Axis) else other for other in taken]
+    deadline_s = time.monotonic() + (OPTIONAL_S if ask.optional else ANSWER_S)
+    while time.monotonic() < deadline_s:
+        for state in _look(pad):
+            answer = moved_axis(rest, state) if ask.is_axis else pressed_button(rest, state)
+            if answer is not None and (answer.axis if isinstance(answer, Axis) else answer) not in names:
+                return answer
+    if ask.optional:
+        return None
+    raise DeviceError("nothing was pressed", "Start again, and press one control at a time.")
+
+
+def _wait_for_rest(pad: Pad, rest: PadState, answer: Axis | str) -> None:
+    deadline_s = time.monotonic() + ANSWER_S
+    while time.monotonic() < deadline_s:
+        held = moved_axis(rest, pad.state) if isinstance(answer, Axis) else pressed_button(rest, pad.state)
+        if held is None:
+            return
+        _look(pad)
+    raise DeviceError("a control did not come back to rest", "Start again, and let go of each control.")
+
+
+def _look(pad: Pad) -> list[PadState]:
+    select.select(pad.fileno_list(), [], [], LOOK_S)
+    return pad.read()[0]

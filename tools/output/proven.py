@@ -1,0 +1,67 @@
+"""What a run has proven, in words, and how sure so few laps make it."""
+
+import math
+from collections.abc import Callable, Sequence
+
+from lira.fusion.log.run_log import LapRecord, ResultRecord
+
+HALVINGS = 60
+
+
+def share(passed: int, laps: int, level: float = 0.95) -> tuple[float, float]:
+    """Interval of the pass rate behind so many passed laps: Clopper and Pearson (1934), exact and never too narrow."""
+    tail = (1.0 - level) / 2.0
+    low = 0.0 if passed == 0 else _root(lambda rate: _at_least(passed, laps, rate) < tail)
+    high = 1.0 if passed == laps else _root(lambda rate: 1.0 - _at_least(passed + 1, laps, rate) > tail)
+    return low, high
+
+
+def share_words(passed: int, laps: int, what: str = "unseen layouts") -> str:
+    """Like: 12 of 12 unseen layouts; 95 %: 74 to 100 %."""
+    low, high = share(passed, laps)
+    return f"{passed} of {laps} {what}; 95 %: {100 * low:.0f} to {100 * high:.0f} %"
+
+
+def proof_words(result: ResultRecord) -> str:
+    """What the proving runs have shown."""
+    kind, _, count = result.proof.partition(":")
+    passed, of, shown = count.partition("/")
+    fresh = f"{passed} of {shown} fresh layouts" if of else f"{passed} fresh layouts in a row"
+    what = fresh if kind == "fresh" else "the layout it was taught on"
+    laps = f"{result.laps} training lap{'s' if result.laps != 1 else ''}"
+    if result.converged:
+        return f"proven after {laps}: the novice alone passed {what}"
+    return f"not proven within {laps}: the novice alone did not pass {what}"
+
+
+def unseen_words(laps: Sequence[LapRecord]) -> str:
+    """How the novice drove the layouts that were shown afterwards; empty where there were none."""
+    if not laps:
+        return ""
+    collisions, lost = sum(lap.collisions for lap in laps), sum(lap.lost for lap in laps)
+    passed = share_words(sum(lap.passed for lap in laps), len(laps))
+    return f"alone it passed {passed}; collisions: {collisions}, lost lines: {lost}"
+
+
+def _at_least(passed: int, laps: int, rate: float) -> float:
+    """Probability of so many passed laps or more, in log space: binomial coefficients outgrow a float."""
+    return sum(
+        math.exp(_log_choose(laps, k) + _log(rate, k) + _log(1.0 - rate, laps - k)) for k in range(passed, laps + 1)
+    )
+
+
+def _log_choose(n: int, k: int) -> float:
+    return math.lgamma(n + 1) - math.lgamma(k + 1) - math.lgamma(n - k + 1)
+
+
+def _log(rate: float, times: int) -> float:
+    return times * math.log(rate) if times else 0.0
+
+
+def _root(below: Callable[[float], bool]) -> float:
+    """Where a condition that holds on the left of [0, 1] ceases to."""
+    low, high = 0.0, 1.0
+    for _ in range(HALVINGS):
+        middle = (low + high) / 2.0
+        low, high = (middle, high) if below(middle) else (low, middle)
+    return (low + high) / 2.0
