@@ -1,4 +1,4 @@
-# Two commands do everything on a fresh machine: `make demo` and `make test`.
+# Two commands do everything on a fresh machine: `make demo` and `make test`. `make` alone lists the rest.
 PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
@@ -8,9 +8,13 @@ EXPERTS := $(foreach task,line eight passage garden corridor,camera:--task:$(tas
   $(foreach task,line passage garden,lidar:--task:$(task))
 BENCHES := twin lockstep latency train preprocess step log drivers takeover
 
-.PHONY: setup demo test check bench results experts clean
+.DEFAULT_GOAL := help
+.PHONY: help setup demo test test-fast check docs map bench results experts wheel clean
 
-setup: $(VENV)/.installed
+help: ## list what can be made
+	@awk -F ':[^#]*## ' '/^[a-z-]+:.*## / {printf "  make %-10s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
+
+setup: $(VENV)/.installed ## make .venv with everything that development needs
 
 # The stamp is written last: whatever was interrupted before it is done again.
 $(VENV)/.installed: pyproject.toml constraints.txt
@@ -20,29 +24,42 @@ $(VENV)/.installed: pyproject.toml constraints.txt
 	$(BIN)/python -m pip install --quiet --constraint constraints.txt --editable '.[dev]'
 	@touch $@
 
-demo: setup
+demo: setup ## teach a robot in the twin, from start to report
 	$(BIN)/lira demo
 
-test: setup
-	$(BIN)/python -m pytest
+test: setup ## every test: the quick ones side by side, then those that need the machine for themselves
+	$(BIN)/python -m pytest -m "not processes" --numprocesses 2 --dist worksteal
+	$(BIN)/python -m pytest -m processes
 
-check: setup
+test-fast: setup ## the unit tests, in under a minute
+	$(BIN)/python -m pytest -m unit --numprocesses 2 --dist worksteal
+
+check: setup ## ruff, mypy (strict), who may import whom
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
 	$(BIN)/python -m pytest tests/test_layering.py
 
-bench: setup
+docs: setup ## the documentation, into site/; a warning fails it
+	$(BIN)/python -m pip install --quiet --constraint constraints.txt --editable '.[docs]'
+	$(BIN)/zensical build --clean --strict
+
+map: setup ## draw the map in README.md anew, from the imports
+	$(BIN)/python docs/map.py --write
+
+bench: setup ## all benchmarks, into runs/bench/
 	@mkdir -p runs/bench
 	@for name in $(BENCHES); do $(BIN)/lira bench $$name --json runs/bench/$$name.json || exit 1; done
 
-# Every experiment of the thesis, then RESULTS.md. It goes on where it was stopped.
-results: setup
+results: setup ## every experiment of the thesis, then RESULTS.md; goes on where it was stopped
 	$(BIN)/lira experiment all --seeds $(SEEDS) --workers $(WORKERS)
 
-# The experts that come with the project, from scratch; each file's header holds the command that made it.
-experts: setup
+# Each expert's header holds the command that made it.
+experts: setup ## the experts that come with the project, from scratch
 	@for expert in $(EXPERTS); do $(BIN)/lira train-expert $$(echo $$expert | tr : ' ') || exit 1; done
 
-clean:
-	rm -rf $(VENV) runs
+wheel: setup ## the wheel, into dist/
+	$(BIN)/python -m pip wheel --quiet --no-deps --wheel-dir dist .
+
+clean: ## forget .venv, runs/, site/ and what was built
+	rm -rf $(VENV) runs site build dist
