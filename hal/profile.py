@@ -80,6 +80,46 @@ class Camera(Table, frozen=True):
     noise_gray: NotNegative = 0.0  # standard deviation of a pixel, of 255
 
 
+class Depth(Table, frozen=True):
+    """Distances in the camera's own view, along its optical axis; 0 beyond the two ranges."""
+
+    width_px: Count
+    height_px: Count
+    range_min_m: Positive
+    range_max_m: Annotated[float, Meta(gt=0.0, le=65.0)]  # it travels in millimetres of 16 bits
+    rate_hz: Positive = 5.0
+
+
+class Imu(Table, frozen=True):
+    """A gyroscope and two accelerometers in the middle of the body, with the standard deviations of their noise."""
+
+    rate_hz: Positive = 10.0
+    noise_rad_s: NotNegative = 0.0
+    noise_m_s2: NotNegative = 0.0
+
+
+class Ranger(Table, frozen=True):
+    """An infrared ranger at (x, y, z) that looks along `yaw_rad`; the nearest in its cone of `fov_rad` counts."""
+
+    frame_id: Literal["range_fl", "range_fr", "range_rl", "range_rr"]
+    x_m: float
+    y_m: float
+    z_m: Positive
+    yaw_rad: float
+    fov_rad: Angle = 0.26
+    range_min_m: NotNegative = 0.03
+    range_max_m: Positive = 0.90
+    rate_hz: Positive = 10.0
+
+
+class Battery(Table, frozen=True):
+    """Voltage when full and when empty, and how long the one takes to become the other."""
+
+    full_v: Positive
+    empty_v: Positive
+    lasts_s: Positive
+
+
 class Features(Table, frozen=True):
     """What the networks see: `bins` ranges over `fov_rad` ahead, clipped at `max_range_m`; a square gray image.
 
@@ -139,6 +179,10 @@ class RobotProfile(Table, frozen=True):
     features: Features
     control: Control
     field: Field | None = None
+    depth: Depth | None = None
+    imu: Imu | None = None
+    battery: Battery | None = None
+    ranger: tuple[Ranger, ...] = ()
 
     def __post_init__(self) -> None:
         """Check what no single key can: raises `ValueError`, which loading turns into a `ConfigError`."""

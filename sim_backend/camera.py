@@ -8,9 +8,11 @@ import math
 
 import cv2
 import numpy as np
+from numpy.typing import NDArray
 
-from lira.hal.messages import ByteArray
-from lira.hal.profile import Camera
+from lira.hal.messages import ByteArray, FloatArray, WordArray
+from lira.hal.profile import Camera, Depth
+from lira.sim_backend.polyline import Floats
 from lira.sim_backend.scene import Scene
 
 NEAR_M = 0.02
@@ -62,6 +64,41 @@ class PinholeCamera:
             size = (self._camera.width_px, self._camera.height_px)
             picture = np.asarray(cv2.resize(picture, size, interpolation=cv2.INTER_AREA), dtype=np.uint8)
         return picture
+
+    def depth(self, depth: Depth, x_m: float, y_m: float, yaw_rad: float) -> WordArray:
+        """Distances along the optical axis from a robot at this pose: uint16 [height, width], millimetres, 0 for none.
+
+        One pixel of the picture is taken for each, none are mixed: between two distances lies nothing.
+        """
+        _, buffer = self.scene.photograph(self.request(x_m, y_m, yaw_rad))
+        rows = _middles(depth.height_px, buffer.shape[0])
+        along_m = axis_distance_m(buffer[rows][:, _middles(depth.width_px, buffer.shape[1])])
+        along_m = np.minimum(along_m, floor_distance_m(self._camera, buffer.shape[0])[rows, None])
+        seen = (along_m >= depth.range_min_m) & (along_m <= depth.range_max_m)
+        return np.where(seen, np.rint(along_m * 1000.0), 0.0).astype(np.uint16)
+
+
+def _middles(count: int, size: int) -> NDArray[np.intp]:
+    """Indices of the middles of `count` equal parts of `size` pixels."""
+    return ((np.arange(count) + 0.5) * size / count).astype(np.intp)
+
+
+def axis_distance_m(buffer: FloatArray) -> Floats:
+    """Distances along the optical axis from OpenGL's depth buffer; infinite where nothing was drawn."""
+    near, far = NEAR_M, FAR_M
+    distance_m: Floats = far * near / (far - (far - near) * buffer.astype(np.float64))
+    return np.where(buffer < 1.0, distance_m, np.inf)
+
+
+def floor_distance_m(camera: Camera, height_px: int) -> Floats:
+    """Distance along the optical axis at which each row meets the floor [height]; infinite above the horizon.
+
+    The floor is not drawn, see `background`.
+    """
+    up = (1.0 - (2.0 * np.arange(height_px) + 1.0) / height_px) * math.tan(camera.vfov_rad / 2)
+    falls = math.sin(camera.pitch_rad) - up * math.cos(camera.pitch_rad)  # per metre along the axis
+    with np.errstate(divide="ignore"):
+        return np.where(falls > 0.0, camera.z_m / falls, np.inf)
 
 
 def background(camera: Camera, width_px: int, height_px: int, scene: Scene) -> ByteArray:

@@ -110,6 +110,11 @@ class Scene:
         _, _, pixels, depth, _ = self._paint(partial(self.bullet.getCameraImage, **request))
         return pixels, depth
 
+    def cast(self, starts: Floats, ends: Floats) -> Floats:
+        """Return the share of each ray, from and to [n, 3], that is free; 1 where it meets nothing."""
+        hits = self.bullet.rayTestBatch(starts.tolist(), ends.tolist(), physicsClientId=self.client)
+        return np.array([hit[2] if hit[0] >= 0 else 1.0 for hit in hits])
+
     def close(self) -> None:
         """Let go of the client. May be called twice."""
         if self.client >= 0:

@@ -117,15 +117,16 @@ class Twin:
                 self._body.advance(self.now())
                 now_s, motion, odom = self._body.time_s, self._body.motion, self._body.measured()
             last = self._newest
-            image, scan = self._sensors.image(motion, now_s), self._sensors.scan(motion, now_s)
+            seen = self._sensors.observe(motion, now_s)
             if last is not None:
                 if last.odom is not None and _periods(now_s) == _periods(last.odom.stamp_s):
                     odom = last.odom
                 stepped = self._factor is None and now_s > last.stamp_s
-                if image is last.image and scan is last.scan and odom is last.odom and not stepped:
+                same = odom is last.odom and all(getattr(last, name) is value for name, value in seen.items())
+                if same and not stepped:
                     return last
             self._seq += 1
-            self._newest = Observation(self._seq, now_s, scan=scan, image=image, odom=odom)
+            self._newest = Observation(self._seq, now_s, odom=odom, **seen)
             return self._newest
 
     def reset(self, episode: Episode) -> None:

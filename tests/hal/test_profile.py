@@ -9,8 +9,8 @@ from lira.hal.profile import NESTED, RobotProfile, known_profiles, load_profile
 
 
 def load_with(table, **changes):
-    profile = load_profile("rosbot2")
-    data = msgspec.to_builtins(profile)
+    data = msgspec.to_builtins(msgspec.structs.replace(load_profile("rosbot2"), ranger=()))
+    data = {key: value for key, value in data.items() if value}
     data[table] |= changes
     text = "\n".join(
         [f"{key} = {value!r}" for key, value in data.items() if not isinstance(value, dict)]
