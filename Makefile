@@ -9,7 +9,7 @@ EXPERTS := $(foreach task,line eight passage garden corridor,camera:--task:$(tas
 BENCHES := twin lockstep latency train preprocess step log drivers takeover
 
 .DEFAULT_GOAL := help
-.PHONY: help setup demo test test-fast check docs map bench results experts wheel clean
+.PHONY: help setup demo test test-fast check docs generated bench results experts wheel clean
 
 help: ## list what can be made
 	@awk -F ':[^#]*## ' '/^[a-z-]+:.*## / {printf "  make %-10s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
@@ -44,8 +44,8 @@ docs: setup ## the documentation, into site/; a warning fails it
 	$(BIN)/python -m pip install --quiet --constraint constraints.txt --editable '.[docs]'
 	$(BIN)/zensical build --clean --strict
 
-map: setup ## draw the map in README.md anew, from the imports
-	$(BIN)/python docs/map.py --write
+generated: setup ## what the documents take from the code: the map, the table of topics
+	$(BIN)/python docs/generate.py --write
 
 bench: setup ## all benchmarks, into runs/bench/
 	@mkdir -p runs/bench

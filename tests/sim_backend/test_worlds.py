@@ -7,6 +7,7 @@ import msgspec
 import numpy as np
 import pytest
 
+import lira.sim_backend
 from lira.hal.errors import ConfigError
 from lira.sim_backend.catalogue import known_worlds, load_world
 from lira.sim_backend.course import Course
@@ -63,7 +64,7 @@ def test_a_users_world_is_loaded_by_its_path(tmp_path):
 
 
 def test_the_world_in_the_readme_loads(tmp_path):
-    readme = Path(sim_backend.__file__).with_name("README.md").read_text(encoding="utf-8")
+    readme = Path(lira.sim_backend.__file__).with_name("README.md").read_text(encoding="utf-8")
     (text,) = re.findall(r"```toml\n(.*?)```", readme, re.DOTALL)
     assert len(build(load_world(write(tmp_path, text))).blocks) == 4
 

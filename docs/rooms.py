@@ -1,18 +1,11 @@
-"""Draws the map of the code from its imports: which rooms there are, and what each stands on.
+"""Draws the map of the code from its imports: which rooms there are, and what each stands on."""
 
-python docs/map.py            print it
-python docs/map.py --write    put it into README.md, between its two marks
-"""
-
-import argparse
 import ast
 from collections.abc import Iterable
 from graphlib import TopologicalSorter
 from pathlib import Path
 
 ROOT = Path(__file__).parent.parent
-README = ROOT / "README.md"
-BEGIN, END = "<!-- map -->\n", "<!-- /map -->\n"
 PACKAGES = ("tools", "fusion", "sim_backend", "robot", "hal")
 WIDTH = 17  # of a name
 
@@ -81,25 +74,10 @@ def draw(graph: Graph, indent: str = "") -> list[str]:
     return [line.rstrip() for line in lines]
 
 
-def text() -> str:
-    """Return the whole map."""
+def code_map() -> str:
+    """Return the whole map, as a block of Markdown."""
     parts = [draw(between())]
     for package in ("fusion", "hal"):
         parts.append([f"{package}/", *draw(inside(package), "  ")])
-    return "\n\n".join("\n".join(part) for part in parts) + "\n"
-
-
-def readme() -> str:
-    """Return README.md with the map of today in it."""
-    before, _, rest = README.read_text(encoding="utf-8").partition(BEGIN)
-    _, _, after = rest.partition(END)
-    return f"{before}{BEGIN}```\n{text()}```\n{END}{after}"
-
-
-if __name__ == "__main__":
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--write", action="store_true")
-    if parser.parse_args().write:
-        README.write_text(readme(), encoding="utf-8")
-    else:
-        print(text(), end="")
+    text = "\n\n".join("\n".join(part) for part in parts)
+    return f"```\n{text}\n```\n"

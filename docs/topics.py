@@ -1,0 +1,33 @@
+"""Writes the bus's topics as a table: keys, types, rates, and the hashes by which ROS 2 knows a type."""
+
+from zenoh import Reliability
+
+from lira.hal.bus.topics import TOPICS, Qos, Topic
+from lira.hal.messages.ros_types import TYPES
+
+
+def topic_table() -> str:
+    """Return one row for each topic."""
+    head = "| key | type | Hz | stale after | travels |\n|---|---|---|---|---|\n"
+    return head + "".join(_row(topic) for topic in TOPICS)
+
+
+def hash_table() -> str:
+    """Return one row for each type on the bus."""
+    types = sorted({topic.ros_type for topic in TOPICS})
+    return "| type | RIHS01 |\n|---|---|\n" + "".join(f"| `{name}` | `{_hash(name)}` |\n" for name in types)
+
+
+def _row(topic: Topic[object]) -> str:
+    age = "never" if topic.max_age_s == float("inf") else f"{topic.max_age_s:g} s"
+    return f"| `{topic.key}` | `{topic.ros_type}` | {topic.rate_hz:g} | {age} | {_way(topic.qos)} |\n"
+
+
+def _way(qos: Qos) -> str:
+    link = "datagram" if qos.reliability == Reliability.BEST_EFFORT else "stream"
+    priority = str(qos.priority).rpartition(".")[2].lower().replace("_", " ")
+    return ", ".join([link, priority, *(["latched"] if qos.latched else [])])
+
+
+def _hash(ros_type: str) -> str:
+    return TYPES.hash_rihs01(ros_type).removeprefix("RIHS01_")
