@@ -6,9 +6,9 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, TypeVar
 
-from lira.hal.bus.clock import is_fresh
 from lira.hal.bus.topics import BATTERY, CAMERA, DEPTH, IMU, ODOM, RANGES, SCAN, Topic
 from lira.hal.client.sensor_reader import Stamped
+from lira.hal.clock import is_fresh
 from lira.hal.errors import ConfigError, DeviceError
 from lira.hal.messages import STOP, Applied, Command, DepthImage, LaserScan, Observation, Reason, Source
 from lira.hal.port import DeviceHealth

@@ -19,13 +19,14 @@ ROOMS = {
     "hal": {
         "errors": set(),
         "config": {"errors"},
+        "clock": set(),
         "messages": {"errors"},
         "profile": {"errors", "config", "messages"},
         "port": {"messages", "profile"},
         "bus": {"errors", "messages"},
-        "safety": {"messages", "profile", "port"},
-        "server": {"errors", "messages", "profile", "port", "bus", "safety"},
-        "client": {"errors", "messages", "profile", "port", "bus", "safety", "server"},
+        "safety": {"clock", "messages", "profile", "port"},
+        "server": {"errors", "clock", "messages", "profile", "port", "bus", "safety"},
+        "client": {"errors", "clock", "messages", "profile", "port", "bus", "safety", "server"},
         "testing": {"messages", "profile"},
     },
     "fusion": {

@@ -6,9 +6,9 @@ from dataclasses import replace
 import msgspec
 
 from lira.hal.bus.bus import Bus
-from lira.hal.bus.clock import ClockEstimate
 from lira.hal.bus.topics import INFO, RESET, SIM_STATE
 from lira.hal.client.remote import RESET_S, RemoteRobot
+from lira.hal.clock import ClockEstimate
 from lira.hal.errors import BusError
 from lira.hal.messages import STOP, Command, CourseState, Episode
 from lira.hal.server.info_service import info_from_json, reset_time

@@ -17,9 +17,9 @@ from collections.abc import Callable
 from dataclasses import replace
 
 from lira.hal.bus.bus import Bus, Publisher
-from lira.hal.bus.clock import ClockEstimate
 from lira.hal.bus.topics import APPLIED, CMD_VEL, SIM_STATE, TELEOP
 from lira.hal.client.sensor_reader import Sense, Senses
+from lira.hal.clock import ClockEstimate
 from lira.hal.errors import BusError
 from lira.hal.messages import HELD, STOP, Applied, Command, CourseState, Observation, Reason, Source, Twist
 from lira.hal.safety.governor import is_neutral

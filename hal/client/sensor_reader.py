@@ -3,8 +3,8 @@
 from typing import Any, Generic, Protocol, TypeVar
 
 from lira.hal.bus.bus import Bus, Received
-from lira.hal.bus.clock import AHEAD_S, is_fresh
 from lira.hal.bus.topics import BATTERY, CAMERA, IMU, ODOM, RANGES, SCAN, Topic
+from lira.hal.clock import AHEAD_S, is_fresh
 from lira.hal.messages import Observation
 
 

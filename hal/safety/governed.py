@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import msgspec
 
-from lira.hal.bus.clock import is_fresh
+from lira.hal.clock import is_fresh
 from lira.hal.messages import Applied, Command, LaserScan, Observation, Reason
 from lira.hal.port import DeviceHealth, DeviceMonitor, Herald, MotorSwitch, Robot
 from lira.hal.profile import Field, RobotProfile

@@ -13,7 +13,7 @@ import math
 from collections import Counter
 from dataclasses import replace
 
-from lira.hal.bus.clock import AHEAD_S
+from lira.hal.clock import AHEAD_S
 from lira.hal.messages import STOP, Applied, Command, Reason, Source, Twist
 from lira.hal.profile import RobotProfile
 from lira.hal.safety.arming import TRANSITIONS, Event, State

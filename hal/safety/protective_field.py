@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from lira.hal.bus.clock import is_fresh
+from lira.hal.clock import is_fresh
 from lira.hal.messages import LaserScan
 from lira.hal.messages.ranges import read_ranges
 from lira.hal.profile import Field, RobotProfile

@@ -7,8 +7,8 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 
 from lira.hal.bus.bus import Bus, Publisher, Reader
-from lira.hal.bus.clock import ClockEstimate, is_fresh
 from lira.hal.bus.topics import BATTERY, CAMERA, CMD_VEL, IMU, ODOM, SCAN, SENSOR, Topic
+from lira.hal.clock import ClockEstimate, is_fresh
 from lira.hal.errors import BusError, ConfigError, DeviceError
 from lira.hal.messages import STOP, Applied, Command, Observation, Reason, Twist, TwistStamped
 from lira.hal.port import DeviceHealth

@@ -4,7 +4,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from lira.hal.bus.clock import HEAL_S, LEAP_S, SILENT_S, WINDOW_S, ClockEstimate
+from lira.hal.clock import HEAL_S, LEAP_S, SILENT_S, WINDOW_S, ClockEstimate
 
 
 def test_the_most_prompt_message_counts():

@@ -7,8 +7,8 @@ import threading
 from collections.abc import Callable
 
 from lira.hal.bus.bus import Bus
-from lira.hal.bus.clock import ClockEstimate
 from lira.hal.bus.topics import APPLIED, DECISION, ESTOP, INFO, JOY, JOY_FEEDBACK, OPERATOR, OPERATOR_ANSWER, TELEOP
+from lira.hal.clock import ClockEstimate
 from lira.hal.errors import BusError
 from lira.hal.messages import (
     Action,

@@ -172,7 +172,7 @@ def freeze_the_guard() -> None:
 
 def run_ahead() -> None:
     """Let a client believe that it is later than it is."""
-    from lira.hal.bus.clock import ClockEstimate
+    from lira.hal.clock import ClockEstimate
 
     after(ClockEstimate, "now", lambda now_s, *_: now_s + 0.09)
 
