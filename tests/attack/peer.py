@@ -6,6 +6,7 @@ The driver notes the time of every command just before it sends it.
 
 import itertools
 import os
+import signal
 import sys
 import time
 from pathlib import Path
@@ -19,6 +20,7 @@ from lira.hal.messages import HELD, STOP, Command, Reason, Twist
 
 GO = Twist(0.15, 0.0)
 PERIOD_S = 0.03
+LIFE_S = 120
 
 
 def drive(name, endpoint, log):
@@ -73,4 +75,5 @@ def _session(name, endpoint):
 
 
 if __name__ == "__main__":
+    signal.alarm(LIFE_S)  # whatever becomes of the test
     {"drive": drive, "flood": flood, "ask": ask}[sys.argv[1]](*sys.argv[2:])

@@ -46,7 +46,7 @@ class Scene:
         self._count += 1
         log = self._folder / f"process{self._count}.log"
         child = self._stack.enter_context(
-            ChildProcess(words[1], [sys.executable, "-P", str(HERE / words[0]), *words[1:]], log)
+            ChildProcess(words[1], [sys.executable, str(HERE / words[0]), *words[1:]], log)
         )
         child.wait_ready(ready, READY_S)
         return child

@@ -4,6 +4,7 @@ The log has a line per order to the base: seconds on the monotonic clock, m/s, r
 `ros2`, a made-up robot behind a bridge.
 """
 
+import signal
 import sys
 import time
 from contextlib import ExitStack, closing
@@ -17,6 +18,7 @@ from lira.hal.server.server import HalServer, stop_on_signal
 from lira.hal.testing import NullRobot
 
 PROFILE = load_profile("thesis-sim")
+LIFE_S = 240
 
 
 class Noted:
@@ -82,4 +84,5 @@ def main(kind, name, endpoint, log, far="0"):
 
 
 if __name__ == "__main__":
+    signal.alarm(LIFE_S)  # whatever becomes of the test
     main(*sys.argv[1:])

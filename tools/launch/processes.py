@@ -25,7 +25,6 @@ class ProcessError(LiraError):
 
 def lira_command(*words: str) -> list[str]:
     """Return the command line of a `lira` verb in the running interpreter, whatever PATH says."""
-    # -P keeps a folder named `tools` below the working directory from being taken for ours.
     return [sys.executable, "-m", "lira.tools", *words]
 
 
