@@ -199,8 +199,8 @@ def poll_for_ever() -> None:
     """Read all there is of a topic, however much comes meanwhile, and all of it."""
     bus = import_module("lira.hal.bus.bus")
     old = swap(bus.Bus, "reader", None)
-    bus.Bus.reader = lambda self, topic, *_: old(self, replace(topic, max_bytes=1 << 30), 1 << 20)
-    swap(import_module("lira.hal.bus.bus.zenoh_session"), "_size_limits", lambda *_: [])
+    bus.Bus.reader = lambda self, topic, *_: old(self, replace(topic, max_bytes=1 << 30), 1 << 15)
+    swap(import_module("lira.hal.bus.zenoh_session"), "_size_limits", lambda *_: [])
 
 
 def promote_viewers() -> None:
@@ -269,7 +269,7 @@ MUTANTS = (
            ("board heard no more",)),
     Mutant("a lost device is not missed", never_miss_a_device, ("board reset, up after 1.1 s",)),
     Mutant("a device that is back arms", rewrite(("lost", "found", "armed")), ("board reset, up after 1.1 s",)),
-    Mutant("a poll has no end", poll_for_ever, ("flood of samples of 1 MB",)),
+    Mutant("a poll has no end", poll_for_ever, ("flood of commands",)),
     Mutant("a viewer may do all", promote_viewers, ("emergency stop released by a viewer",)),
     Mutant("links outlive their certificates", keep_expired_links, ("certificate runs out",)),
     Mutant("who is revoked stays", never_read_keys_again, ("name revoked",)),

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 
 import msgspec
 
+<<<<<<< HEAD:tools/stop_test/testbed.py
 from lira.hal.bus.bus import Bus
 from lira.hal.bus.keys import VARIABLE as KEYS_VARIABLE
 from lira.hal.bus.keys import load_keys
@@ -28,6 +29,25 @@ from lira.tools.stop_test.intruder import Intruder
 from lira.tools.stop_test.journal import Journal, JournalReader
 from lira.tools.stop_test.mutants import Mutant
 from lira.tools.stop_test.setups import BRIEF, LAPTOP, Setup, clock_library
+=======
+from hal.bus import Bus
+from hal.errors import BusError
+from hal.estop import release_estop
+from hal.keys import VARIABLE as KEYS_VARIABLE
+from hal.keys import load_keys
+from hal.messages import Episode, Source
+from hal.profile import RobotProfile, load_profile
+from hal.topics import APPLIED, DIAGNOSTICS, INFO, RESET
+from tools import relay
+from tools.processes import ChildProcess, ProcessError, free_port
+from tools.stop_test import driver, hand, launch, pulse, robot, world
+from tools.stop_test.acts import StopTestError
+from tools.stop_test.control import ASK_TIME, TIME, tell
+from tools.stop_test.intruder import Intruder
+from tools.stop_test.journal import Journal, JournalReader
+from tools.stop_test.mutants import Mutant
+from tools.stop_test.setups import BRIEF, LAPTOP, Setup, clock_library
+>>>>>>> f0104bb (Stop test: a robot that lets nobody come back fails its row):tools/stop_test/bench.py
 
 if TYPE_CHECKING:
     from lira.tools.stop_test.keyring import Keyring
@@ -174,9 +194,13 @@ class ProcessBench:
         return bool(wheels) and wheels[-1].linear_m_s > share * self.profile.base.max_linear_m_s
 
     def ask_for_motion(self) -> None:
-        """Have the commander, or another if it is dead, ask for motion, and never for zero."""
+        """Have the commander, or another if it is dead, ask for motion, and never for zero.
+
+        A robot that lets nobody come back is asked by nobody, and that is what fails its row.
+        """
         if self._running[POLICY].status() is not None:
-            self._run_driver()
+            with contextlib.suppress(ProcessError):
+                self._run_driver()
         self._running[self._tested].signal(signal.SIGCONT)
         tell(self._ports[POLICY], "insist")
 
