@@ -99,7 +99,7 @@ class ProcessBench:
         self.observer.ask(INFO)
         self._applied, self._reports = self.observer.reader(APPLIED), self.observer.reader(DIAGNOSTICS)
         self.intruder = Intruder(self.observer, self._journal.folder, self._keyring)
-        stack.callback(self.intruder.rest)
+        stack.callback(self.intruder.close)
 
     @property
     def driver(self) -> ChildProcess:
