@@ -128,7 +128,7 @@ def flooded(kind: str, setup: Setup = TWIN, *, quick: bool = False) -> Row:
     where = "" if setup is TWIN else f" on {setup.name}"
     return Row(
         f"flood of {kind}{where}",
-        one_by_one(flood(kind), pause(1.0), KILL),
+        one_by_one(INSIST, flood(kind), pause(1.0), KILL),
         acts.rest,
         hold_s=1.5,
         stopped_by=(WATCHDOG, REFUSAL, BASE, GUARD),
