@@ -11,7 +11,6 @@ from typing import TYPE_CHECKING
 
 import msgspec
 
-<<<<<<< HEAD:tools/stop_test/testbed.py
 from lira.hal.bus.bus import Bus
 from lira.hal.bus.keys import VARIABLE as KEYS_VARIABLE
 from lira.hal.bus.keys import load_keys
@@ -21,7 +20,7 @@ from lira.hal.messages import Episode, Source
 from lira.hal.profile import RobotProfile, load_profile
 from lira.hal.server.estop_service import release_estop
 from lira.tools.launch import link_fault as relay
-from lira.tools.launch.processes import ChildProcess, free_port
+from lira.tools.launch.processes import ChildProcess, ProcessError, free_port
 from lira.tools.stop_test import driver, hand, launch, pulse, robot, world
 from lira.tools.stop_test.acts import StopTestError
 from lira.tools.stop_test.control import ASK_TIME, TIME, tell
@@ -29,25 +28,6 @@ from lira.tools.stop_test.intruder import Intruder
 from lira.tools.stop_test.journal import Journal, JournalReader
 from lira.tools.stop_test.mutants import Mutant
 from lira.tools.stop_test.setups import BRIEF, LAPTOP, Setup, clock_library
-=======
-from hal.bus import Bus
-from hal.errors import BusError
-from hal.estop import release_estop
-from hal.keys import VARIABLE as KEYS_VARIABLE
-from hal.keys import load_keys
-from hal.messages import Episode, Source
-from hal.profile import RobotProfile, load_profile
-from hal.topics import APPLIED, DIAGNOSTICS, INFO, RESET
-from tools import relay
-from tools.processes import ChildProcess, ProcessError, free_port
-from tools.stop_test import driver, hand, launch, pulse, robot, world
-from tools.stop_test.acts import StopTestError
-from tools.stop_test.control import ASK_TIME, TIME, tell
-from tools.stop_test.intruder import Intruder
-from tools.stop_test.journal import Journal, JournalReader
-from tools.stop_test.mutants import Mutant
-from tools.stop_test.setups import BRIEF, LAPTOP, Setup, clock_library
->>>>>>> f0104bb (Stop test: a robot that lets nobody come back fails its row):tools/stop_test/bench.py
 
 if TYPE_CHECKING:
     from lira.tools.stop_test.keyring import Keyring
