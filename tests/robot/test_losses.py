@@ -7,6 +7,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from lira.hal.bus.boundary import Boundary
 from lira.hal.bus.bus import Received
 from lira.hal.errors import DeviceError
 from lira.hal.messages import STOP, Command, CompressedImage, LaserScan, Odometry, Reason, Twist
@@ -180,6 +181,7 @@ class FarBus:
 
     def __init__(self):
         self.queues, self.sent = {}, []
+        self.boundary = Boundary()
 
     def reader(self, topic):
         queue = self.queues.setdefault(topic.key, [])
