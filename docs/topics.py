@@ -20,7 +20,15 @@ def hash_table() -> str:
 
 def _row(topic: Topic[object]) -> str:
     age = "never" if topic.max_age_s == float("inf") else f"{topic.max_age_s:g} s"
-    return f"| `{topic.key}` | `{topic.ros_type}` | {topic.rate_hz:g} | {age} | {_size(topic.max_bytes)} | {_way(topic.qos)} |\n"
+    cells = [
+        f"`{topic.key}`",
+        f"`{topic.ros_type}`",
+        f"{topic.rate_hz:g}",
+        age,
+        _size(topic.max_bytes),
+        _way(topic.qos),
+    ]
+    return f"| {' | '.join(cells)} |\n"
 
 
 def _size(count: int) -> str:

@@ -3,7 +3,7 @@ import json
 import pytest
 
 from lira.hal.errors import ConfigError
-from lira.tools.bench import history
+from lira.tools.output import bench_history as history
 from lira.tools.verbs import bench
 
 ROWS = [

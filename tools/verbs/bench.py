@@ -61,7 +61,7 @@ def note(path: Path, results: list[Row]) -> bool:
     """Add the ratios to a benchmark's history, and say on standard error which are worse than before, if any."""
     from importlib.metadata import version
 
-    from lira.tools.bench.history import append, entry, read_history, worse
+    from lira.tools.output.bench_history import append, entry, read_history, worse
 
     before, now = read_history(path), entry(describe_machine(), version("lira-rosbot"), results)
     append(path, now)
