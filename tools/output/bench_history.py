@@ -4,6 +4,7 @@ Times differ from machine to machine and from day to day, ratios against a refer
 alone are kept, and compared with those of the same machine.
 """
 
+import math
 import statistics
 from collections.abc import Sequence
 from pathlib import Path
@@ -36,7 +37,7 @@ def ratios(rows: Sequence[Row]) -> dict[str, float]:
     for row in rows:
         words = [value for value in row.values() if isinstance(value, str)]
         for field, value in row.items():
-            if (SPEED in field or COST in field) and isinstance(value, int | float):
+            if (SPEED in field or COST in field) and isinstance(value, int | float) and math.isfinite(value):
                 found[" ".join([*words, field])] = float(value)
     return found
 
