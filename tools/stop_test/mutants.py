@@ -165,9 +165,9 @@ def never_time_out_in_the_base() -> None:
 
 def freeze_the_guard() -> None:
     """Let the guard never strike."""
-    from lira.robot.core2.watchdog import Guard
+    from lira.robot.core2.watchdog import WatchdogProcess
 
-    after(Guard, "__init__", lambda _, guard, *__: os.kill(guard._process.pid, signal.SIGSTOP))
+    after(WatchdogProcess, "__init__", lambda _, guard, *__: os.kill(guard._process.pid, signal.SIGSTOP))
 
 
 def run_ahead() -> None:
