@@ -56,8 +56,7 @@ class RemoteRobot:
     def open(self) -> None:
         """Find the robot. Raises `BusError` if nobody answers."""
         info = info_from_json(self._bus.ask(INFO, timeout_s=self._answer_s))
-        patience_s = info.profile.control.policy_timeout_s
-        link = LockstepLink(self._bus) if info.mode == LOCKSTEP else RealTimeLink(self._bus, patience_s)
+        link = (LockstepLink if info.mode == LOCKSTEP else RealTimeLink)(self._bus, info.profile)
         # Asked once more: the robot shows its observation before it answers, and by now the link listens.
         self._info = info_from_json(self._bus.ask(INFO, timeout_s=self._answer_s))
         self._link = link

@@ -278,6 +278,8 @@ class Clock:
 class Observation:
     """The newest of every sensor at `stamp_s`; a sensor that is absent or stale is None.
 
+    `hal.bus.sensors` has a row for each. Pictures may come compressed, as they travelled.
+
     `seq` numbers observations; a command names the one it answers.
     """
 
@@ -289,7 +291,7 @@ class Observation:
     imu: Imu | None = None
     battery: BatteryState | None = None
     ranges: tuple[Range, ...] = field(default=())
-    depth: DepthImage | None = None
+    depth: DepthImage | CompressedImage | None = None
 
 
 @dataclass(frozen=True, slots=True)

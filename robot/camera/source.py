@@ -36,7 +36,8 @@ def open_source(url: str, size: tuple[int, int], openni_folder: Path | None, *, 
     except ValueError as error:
         raise ConfigError(f"'{url}' is no address: {error}", "Give the camera's own address.") from error
     if depth and scheme != "openni":
-        raise ConfigError(f"'{url}' has no depth", "Take depth = true out of the settings, or use openni:.")
+        remedy = "Take [depth] out of the profile and depth = true out of the settings, or use openni:."
+        raise ConfigError(f"'{url}' has no depth", remedy)
     if scheme == "openni":
         from lira.robot.camera.astra import OpenniSource
 

@@ -9,10 +9,12 @@ from dataclasses import dataclass
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
+import msgspec
+
 from lira.hal.bus.bus import Bus
 from lira.hal.client.remote import RemoteArena, RemoteRobot
 from lira.hal.port import Arena, Robot
-from lira.hal.profile import load_profile
+from lira.hal.profile import Depth, load_profile
 from lira.hal.safety.governed import GovernedRobot
 from lira.hal.server.server import HalServer
 from lira.hal.testing import NullRobot
@@ -23,30 +25,40 @@ from lira.sim_backend.emulators.wired_twin import WiredTwin
 from lira.sim_backend.twin import Twin
 from lira.tools.launch.processes import free_port
 
-PROFILE = load_profile("thesis-sim")
+ROSBOT = load_profile("rosbot2")
+PROFILE = msgspec.structs.replace(  # with every sensor that there is
+    load_profile("thesis-sim"),
+    depth=Depth(width_px=16, height_px=12, range_min_m=0.1, range_max_m=4.0),
+    imu=ROSBOT.imu,
+    battery=ROSBOT.battery,
+    ranger=ROSBOT.ranger,
+)
 
 
 @dataclass(frozen=True)
 class Rig:
-    """An open robot, the truth about it, and how its time passes."""
+    """An open robot, the one that measures for it, the truth about it, and how its time passes."""
 
     robot: Robot
+    source: Robot
     arena: Arena
     real_time: bool = False  # its time passes by itself
     stepped: bool = False  # its time passes with policy's commands only, a period each
 
 
 @contextmanager
-def served(governed: GovernedRobot, arena: Arena, *, lockstep: bool) -> Iterator[Rig]:
+def served(inner: NullRobot | Twin, *, lockstep: bool) -> Iterator[Rig]:
     """Put a robot on a bus of its own, and open it from the other end."""
     name, endpoint, stop = f"t{uuid.uuid4().hex}", f"127.0.0.1:{free_port()}", threading.Event()
     robot_bus, client_bus = Bus(name, listen=endpoint), Bus(name, connect=endpoint)
-    server = threading.Thread(target=HalServer(governed, robot_bus, arena, lockstep=lockstep).run, args=[stop])
+    server = threading.Thread(
+        target=HalServer(GovernedRobot(inner), robot_bus, inner, lockstep=lockstep).run, args=[stop]
+    )
     server.start()
     robot = RemoteRobot(client_bus)
     try:
         robot.open()
-        yield Rig(robot, RemoteArena(robot), real_time=not lockstep, stepped=lockstep)
+        yield Rig(robot, inner, RemoteArena(robot), real_time=not lockstep, stepped=lockstep)
     finally:
         robot.close()
         stop.set()
@@ -61,21 +73,21 @@ def null() -> Iterator[Rig]:
     inner = NullRobot(PROFILE)
     robot = GovernedRobot(inner)
     robot.open()
-    yield Rig(robot, inner)
+    yield Rig(robot, inner, inner)
     robot.close()
 
 
 @contextmanager
 def null_real_time() -> Iterator[Rig]:
     inner = NullRobot(PROFILE, time.monotonic, time.sleep)
-    with served(GovernedRobot(inner), inner, lockstep=False) as rig:
+    with served(inner, lockstep=False) as rig:
         yield rig
 
 
 @contextmanager
 def null_lockstep() -> Iterator[Rig]:
     inner = NullRobot(PROFILE)
-    with served(GovernedRobot(inner), inner, lockstep=True) as rig:
+    with served(inner, lockstep=True) as rig:
         yield rig
 
 
@@ -88,21 +100,21 @@ def twin() -> Iterator[Rig]:
     inner = make_twin()
     robot = GovernedRobot(inner)
     robot.open()
-    yield Rig(robot, inner)
+    yield Rig(robot, inner, inner)
     robot.close()
 
 
 @contextmanager
 def twin_real_time() -> Iterator[Rig]:
     inner = make_twin(1.0)
-    with served(GovernedRobot(inner), inner, lockstep=False) as rig:
+    with served(inner, lockstep=False) as rig:
         yield rig
 
 
 @contextmanager
 def twin_lockstep() -> Iterator[Rig]:
     inner = make_twin()
-    with served(GovernedRobot(inner), inner, lockstep=True) as rig:
+    with served(inner, lockstep=True) as rig:
         yield rig
 
 
@@ -115,10 +127,12 @@ def rosbot_on_emulators() -> Iterator[Rig]:
         folder = Path(name)
         wired = WiredTwin(make_twin(1.0), folder, firmware=Firmware(boot_s=0.05))
         devices = Devices(str(folder / "core2"), str(folder / "rplidar"), wired.url, settings=WIRED)
-        robot = GovernedRobot(Rosbot(PROFILE, devices))
+        # A network camera has no depth.
+        inner = Rosbot(msgspec.structs.replace(PROFILE, depth=None), devices)
+        robot = GovernedRobot(inner)
         try:
             robot.open()
-            yield Rig(robot, wired, real_time=True)
+            yield Rig(robot, inner, wired, real_time=True)
         finally:
             robot.close()
             wired.close()

@@ -14,6 +14,7 @@ from lira.hal.bus.topics import APPLIED, SCAN
 from lira.hal.client.realtime import RealTimeLink
 from lira.hal.clock import SILENT_S
 from lira.hal.messages import HELD, STOP, Applied, Command, LaserScan, Reason, Source, Twist
+from lira.hal.profile import load_profile
 from lira.hal.safety.lease import session_of
 
 OLD, NEW = 1000.0, 3.0  # what the clocks say
@@ -93,7 +94,7 @@ def bus():
 
 @pytest.fixture
 def link(bus):
-    link = RealTimeLink(bus, 0.25)
+    link = RealTimeLink(bus, load_profile("thesis-sim"))
     yield link
     link.close()
 

@@ -31,7 +31,7 @@ from lira.hal.messages import (
     Twist,
     TwistStamped,
 )
-from lira.hal.server.sensor_publisher import compress
+from lira.hal.messages.compression import compress
 
 NAN, INF = math.nan, math.inf
 

@@ -5,8 +5,8 @@ from dataclasses import dataclass, field
 from typing import Any, Generic, TypeVar
 
 from lira.hal.bus.bus import Bus, Reader
+from lira.hal.bus.sensors import Stamped
 from lira.hal.bus.topics import APPLIED, CAMERA, CMD_VEL, IMU, INFO, ODOM, SCAN
-from lira.hal.client.sensor_reader import Stamped
 from lira.hal.clock import ClockEstimate
 from lira.hal.errors import BusError, ConfigError
 from lira.hal.messages import STOP, Applied, CompressedImage, Imu, LaserScan, Odometry, Reason, Source
