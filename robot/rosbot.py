@@ -12,7 +12,7 @@ from lira.hal.messages import STOP, Applied, Command, DepthImage, LaserScan, Obs
 from lira.hal.port import DeviceHealth
 from lira.hal.profile import RobotProfile
 from lira.robot.camera.device import CameraDevice
-from lira.robot.camera.source import Picture
+from lira.robot.camera.port import Picture
 from lira.robot.core2.device import Core2
 from lira.robot.rplidar.device import RPLidar
 from lira.robot.settings import Settings

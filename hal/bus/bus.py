@@ -29,7 +29,6 @@ from lira.hal.messages.codec import decode, encode
 M = TypeVar("M")
 
 DEFAULT_ROBOT = "rosbot"
-DEFAULT_ENDPOINT = "127.0.0.1:7447"
 LINKS_PER_PEER = 2
 QUERY_PAUSE_S = 0.1
 QUESTIONS = 256  # that wait at most; each round answers no more

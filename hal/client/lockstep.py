@@ -7,7 +7,7 @@ step sees does not depend on how fast the messages came.
 import time
 
 from lira.hal.bus.bus import Bus
-from lira.hal.bus.topics import APPLIED, CLOCK, CMD_VEL, LOCKSTEP, SIM_STATE, TELEOP
+from lira.hal.bus.topics import APPLIED, CLOCK, CMD_VEL, IN_LOCKSTEP, SIM_STATE, TELEOP
 from lira.hal.client.sensor_reader import SensorReader
 from lira.hal.errors import BusError
 from lira.hal.messages import STOP, Applied, Clock, Command, CourseState, Observation, Source
@@ -26,8 +26,8 @@ class LockstepLink:
         self._states = bus.reader(SIM_STATE)
         self._results = bus.reader(APPLIED)
         self._clock = bus.reader(CLOCK)
-        self._policy = bus.publisher(CMD_VEL, LOCKSTEP)
-        self._teleop = bus.publisher(TELEOP, LOCKSTEP)
+        self._policy = bus.publisher(CMD_VEL, IN_LOCKSTEP)
+        self._teleop = bus.publisher(TELEOP, IN_LOCKSTEP)
         self._applied = Applied(STOP, 0.0)
         self._observation = Observation(-1, 0.0)
         self._state: CourseState | None = None

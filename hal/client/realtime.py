@@ -21,10 +21,20 @@ from lira.hal.bus.topics import APPLIED, CMD_VEL, SIM_STATE, TELEOP
 from lira.hal.client.sensor_reader import Sense, SensorReader
 from lira.hal.clock import ClockEstimate
 from lira.hal.errors import BusError
-from lira.hal.messages import HELD, STOP, Applied, Command, CourseState, Observation, Reason, Source, Twist
+from lira.hal.messages import (
+    HELD,
+    STOP,
+    Applied,
+    Command,
+    CourseState,
+    Observation,
+    Reason,
+    Source,
+    Twist,
+    is_neutral,
+    session_of,
+)
 from lira.hal.profile import RobotProfile
-from lira.hal.safety.governor import is_neutral
-from lira.hal.safety.lease import session_of
 
 REPEAT_HZ = 20.0
 DECISION_S = 0.5  # age at which a decision is no longer sent

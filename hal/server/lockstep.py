@@ -10,7 +10,7 @@ import time
 from dataclasses import replace
 
 from lira.hal.bus.bus import Bus
-from lira.hal.bus.topics import APPLIED, CLOCK, LOCKSTEP, SIM_STATE, TELEOP
+from lira.hal.bus.topics import APPLIED, CLOCK, IN_LOCKSTEP, SIM_STATE, TELEOP
 from lira.hal.messages import Clock, Command, Observation
 from lira.hal.port import Arena
 from lira.hal.safety.governed import GovernedRobot
@@ -36,9 +36,9 @@ class LockstepLoop:
         self._inlet = Inlet(bus)
         self._estop = EstopDesk(robot, bus)
         self._sensors = SensorPublisher(bus, robot.profile, lockstep=True)
-        self._applied = bus.publisher(APPLIED, LOCKSTEP)
-        self._state = bus.publisher(SIM_STATE, LOCKSTEP)
-        self._clock = bus.publisher(CLOCK, LOCKSTEP)
+        self._applied = bus.publisher(APPLIED, IN_LOCKSTEP)
+        self._state = bus.publisher(SIM_STATE, IN_LOCKSTEP)
+        self._clock = bus.publisher(CLOCK, IN_LOCKSTEP)
         self._observation = Observation(0, 0.0)
 
     def run(self, stop: threading.Event) -> None:

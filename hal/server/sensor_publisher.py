@@ -4,7 +4,7 @@ from typing import Any
 
 from lira.hal.bus.bus import Bus, Publisher
 from lira.hal.bus.sensors import SENSORS, Sensor, Stamped
-from lira.hal.bus.topics import LOCKSTEP
+from lira.hal.bus.topics import IN_LOCKSTEP
 from lira.hal.messages import Observation
 from lira.hal.profile import RobotProfile
 
@@ -20,7 +20,7 @@ class SensorPublisher:
         self._profile = profile
         self._lockstep = lockstep
         self._sent_s: dict[str, float] = {}
-        qos = LOCKSTEP if lockstep else None
+        qos = IN_LOCKSTEP if lockstep else None
         self._publishers: dict[str, Publisher[Any]] = {each.name: bus.publisher(each.topic, qos) for each in SENSORS}
 
     def put(self, observation: Observation, now_s: float) -> None:

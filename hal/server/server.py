@@ -9,13 +9,14 @@ from types import FrameType
 import msgspec
 
 from lira.hal.bus.bus import Bus
+from lira.hal.bus.services import LOCKSTEP, REALTIME, Info
 from lira.hal.bus.topics import INFO
 from lira.hal.errors import BusError
 from lira.hal.port import Arena
 from lira.hal.safety.governed import GovernedRobot
 from lira.hal.server.diagnostics import Reporter
 from lira.hal.server.estop_service import EstopDesk
-from lira.hal.server.info_service import LOCKSTEP, REALTIME, Desk, Info
+from lira.hal.server.info_service import Desk
 from lira.hal.server.instance import only_instance
 from lira.hal.server.lockstep import LockstepLoop
 from lira.hal.server.realtime import JOIN_S, AppliedLoop, CommandLoop, PictureLoop, SensorLoop

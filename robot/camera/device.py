@@ -11,7 +11,8 @@ from lira.hal.messages.compression import PICTURE_LIMIT_BYTES, fit_jpeg
 from lira.hal.messages.images import JPEG_START
 from lira.hal.profile import Camera
 from lira.robot.camera.decode import check, decode
-from lira.robot.camera.source import Picture, Source, open_source
+from lira.robot.camera.port import Picture, Source
+from lira.robot.camera.source import open_source
 
 GRAB_S = 0.2
 FIRST_S = 5.0  # some cameras take their time to begin

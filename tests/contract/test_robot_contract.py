@@ -6,9 +6,8 @@ import pytest
 from robots import REAL_TIME, ROBOTS, STEPPED, Rig
 
 from lira.hal.errors import LiraError
-from lira.hal.messages import STOP, Applied, Command, Episode, Reason, Source, Twist
+from lira.hal.messages import STOP, Applied, Command, Episode, Reason, Source, Twist, is_neutral
 from lira.hal.port import Arena, Robot
-from lira.hal.safety.governor import is_neutral
 
 STEPS = 15  # more than any robot needs to do as told, over any bus
 

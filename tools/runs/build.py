@@ -4,27 +4,27 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
 
-from lira.fusion.methods.cloning import Cloning, CloningSettings
-from lira.fusion.methods.doubt import Doubtful, DoubtLog
-from lira.fusion.policies.ensemble import EnsembleNet
 from lira.fusion.experts.files import SHIPPED
 from lira.fusion.experts.load import as_expert, load_network
-from lira.fusion.methods.hg_dagger import HgDagger, HgDaggerSettings
-from lira.fusion.policies.kernel_net import KernelNet
+from lira.fusion.experts.tasks import DEFAULT
 from lira.fusion.learning.kernel_novice import KernelNovice
 from lira.fusion.learning.learner import Learner
-from lira.fusion.methods.lira import LiraSettings, LiraSpf
+from lira.fusion.learning.novice import NetworkNovice, Novice, Trainer
 from lira.fusion.methods.base import Alone, Expert
 from lira.fusion.methods.base import Method as Driver
-from lira.fusion.policies.networks import CameraNet, FusionNet, LidarNet, Network
-from lira.fusion.learning.novice import NetworkNovice, Novice, Trainer
+from lira.fusion.methods.cloning import Cloning, CloningSettings
+from lira.fusion.methods.doubt import Doubtful, DoubtLog
+from lira.fusion.methods.hg_dagger import HgDagger, HgDaggerSettings
+from lira.fusion.methods.lira import LiraSettings, LiraSpf
 from lira.fusion.methods.plus import LiraPlus, PlusSettings
 from lira.fusion.methods.presets import Method
-from lira.fusion.teaching.session import Apprentice, Drive
 from lira.fusion.methods.shared_feedback import SharedFeedback
 from lira.fusion.methods.switching import Switching, SwitchingSettings
 from lira.fusion.methods.syllabus import Syllabus
-from lira.fusion.experts.tasks import DEFAULT
+from lira.fusion.policies.ensemble import EnsembleNet
+from lira.fusion.policies.kernel_net import KernelNet
+from lira.fusion.policies.networks import CameraNet, FusionNet, LidarNet, Network
+from lira.fusion.teaching.session import Apprentice, Drive
 from lira.fusion.teaching.teacher import ScriptedTeacher, TeacherSettings
 from lira.hal.errors import ConfigError
 from lira.hal.messages import Episode

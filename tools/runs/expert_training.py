@@ -8,25 +8,25 @@ import msgspec
 import numpy as np
 import torch
 
-from lira.fusion.policies.checkpoint import Checkpoint, save_checkpoint
 from lira.fusion.control import ControlLoop
-from lira.fusion.teaching.curriculum import Curriculum, curriculum
 from lira.fusion.experts.files import SHIPPED, Sensor, folder_of, seeded
-from lira.fusion.methods.hg_dagger import HgDagger
-from lira.fusion.log.recorder import Journal
-from lira.fusion.learning.learner import Learner
-from lira.fusion.methods.base import Alone
-from lira.fusion.policies.networks import CameraNet, LidarNet, Network
-from lira.fusion.learning.novice import LearningSettings, NetworkNovice
-from lira.fusion.log.run_log import Record
-from lira.fusion.teaching.session import Same, Session
 from lira.fusion.experts.tasks import DEFAULT, TASKS
-from lira.fusion.teaching.teacher import ScriptedTeacher
+from lira.fusion.learning.learner import Learner
+from lira.fusion.learning.novice import LearningSettings, NetworkNovice
 from lira.fusion.learning.trainer import InlineTrainer
+from lira.fusion.log.recorder import Journal
+from lira.fusion.log.run_log import Record
+from lira.fusion.methods.base import Alone
+from lira.fusion.methods.hg_dagger import HgDagger
+from lira.fusion.policies.checkpoint import Checkpoint, save_checkpoint
+from lira.fusion.policies.networks import CameraNet, LidarNet, Network
+from lira.fusion.teaching.curriculum import Curriculum, curriculum
+from lira.fusion.teaching.session import Same, Session
+from lira.fusion.teaching.teacher import ScriptedTeacher
 from lira.hal.errors import LiraError
-from lira.hal.safety.governed import GovernedRobot
 from lira.hal.messages import Action
 from lira.hal.profile import RobotProfile, load_profile
+from lira.hal.safety.governed import GovernedRobot
 from lira.sim_backend.catalogue import load_world
 from lira.sim_backend.foresight import Foresight, sketching
 from lira.sim_backend.twin import Twin

@@ -7,11 +7,11 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
 
-from lira.fusion.policies.checkpoint import Checkpoint, save_checkpoint
 from lira.fusion.learning.novice import Novice
-from lira.fusion.methods.presets import method_named
 from lira.fusion.log.run_log import RunRecord
+from lira.fusion.methods.presets import method_named
 from lira.fusion.operator_service import Job
+from lira.fusion.policies.checkpoint import Checkpoint, save_checkpoint
 from lira.hal.profile import RobotProfile
 from lira.tools.cli import version
 

@@ -9,27 +9,27 @@ from pathlib import Path
 import msgspec
 
 from lira.fusion.control import ControlLoop
-from lira.fusion.log.label_log import DemonstrationLog
 from lira.fusion.experts.load import load_alone
-from lira.fusion.log.recorder import Journal
-from lira.fusion.methods.presets import Method
-from lira.fusion.log.run_log import Record, RunWriter
-from lira.fusion.teaching.session import Session
-from lira.fusion.methods.syllabus import THESIS
 from lira.fusion.experts.tasks import task_of
-from lira.fusion.teaching.teacher import TEACHERS
 from lira.fusion.learning.trainer import ProcessTrainer
+from lira.fusion.log.label_log import DemonstrationLog
+from lira.fusion.log.recorder import Journal
+from lira.fusion.log.run_log import Record, RunWriter
+from lira.fusion.methods.presets import Method
+from lira.fusion.methods.syllabus import THESIS
+from lira.fusion.teaching.session import Session
+from lira.fusion.teaching.teacher import TEACHERS
 from lira.hal.bus.bus import Bus
+from lira.hal.client.arena import WiredArena
+from lira.hal.client.remote import RemoteArena, RemoteRobot
 from lira.hal.errors import ConfigError
 from lira.hal.messages import Decision
 from lira.hal.port import Arena
-from lira.hal.client.remote import RemoteArena, RemoteRobot
-from lira.hal.client.arena import WiredArena
 from lira.sim_backend.world import World
-from lira.tools.runs.build import Course, crew, teacher
 from lira.tools.launch.lifetime import CLOSE_S, saving
-from lira.tools.runs.progress import Progress
+from lira.tools.runs.build import Course, crew, teacher
 from lira.tools.runs.folder import LABELS, RECORD, head, snapshot
+from lira.tools.runs.progress import Progress
 
 NO_TWIN = "Here, a person teaches (--teacher none), and a policy drives without --unseen."
 Publish = Callable[[Decision], None]

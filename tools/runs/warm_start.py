@@ -4,17 +4,17 @@ from collections.abc import Sequence
 from functools import cache
 
 from lira.fusion.control import ControlLoop
-from lira.fusion.teaching.curriculum import curriculum
 from lira.fusion.experts.load import load_expert
-from lira.fusion.learning.learner import Label
-from lira.fusion.methods.base import Alone
-from lira.fusion.learning.novice import Novice, is_redundant
-from lira.fusion.preprocess import Features
-from lira.fusion.methods.presets import Sensor
 from lira.fusion.experts.tasks import DEFAULT, TASKS
-from lira.hal.safety.governed import GovernedRobot
+from lira.fusion.learning.learner import Label
+from lira.fusion.learning.novice import Novice, is_redundant
+from lira.fusion.methods.base import Alone
+from lira.fusion.methods.presets import Sensor
+from lira.fusion.preprocess import Features
+from lira.fusion.teaching.curriculum import curriculum
 from lira.hal.messages import Action, Episode
 from lira.hal.profile import RobotProfile
+from lira.hal.safety.governed import GovernedRobot
 from lira.sim_backend.catalogue import load_world
 from lira.sim_backend.twin import Twin
 

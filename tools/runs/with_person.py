@@ -8,19 +8,19 @@ from pathlib import Path
 import msgspec
 
 from lira.fusion.control import ControlLoop
-from lira.fusion.log.label_log import DemonstrationLog, read_demonstrations
 from lira.fusion.experts.load import load_alone
-from lira.fusion.log.recorder import Journal
+from lira.fusion.experts.tasks import task_of
 from lira.fusion.learning.learner import Label
-from lira.fusion.methods.presets import method_named
+from lira.fusion.log.label_log import DemonstrationLog, read_demonstrations
+from lira.fusion.log.recorder import Journal
 from lira.fusion.log.run_log import RunWriter
+from lira.fusion.methods.presets import method_named
 from lira.fusion.operator_service import RequestDesk, RequestLine
 from lira.fusion.service import serve
 from lira.fusion.teaching.session import Apprentice
-from lira.fusion.experts.tasks import task_of
 from lira.hal.bus.bus import Bus
-from lira.hal.messages import Decision, Episode
 from lira.hal.client.remote import RemoteArena, RemoteRobot
+from lira.hal.messages import Decision, Episode
 from lira.sim_backend.world import World
 from lira.tools.launch.lifetime import CLOSE_S, saving, stop_or_interrupt
 from lira.tools.runs.folder import FLOOR, LABELS, RECORD, head, snapshot
