@@ -29,6 +29,7 @@ from lira.hal.messages.codec import decode, encode
 M = TypeVar("M")
 
 DEFAULT_ROBOT = "rosbot"
+DEFAULT_ENDPOINT = "127.0.0.1:7447"
 LINKS_PER_PEER = 2
 QUERY_PAUSE_S = 0.1
 QUESTIONS = 256  # that wait at most; each round answers no more
@@ -479,4 +480,4 @@ def _check_address(endpoint: str | None) -> None:
         return
     match = re.fullmatch(r"(\[[0-9a-fA-F:.]+\]|[A-Za-z0-9_.-]+):(\d{1,5})", endpoint)
     if match is None or not 0 < int(match[2]) < 65536:
-        raise ConfigError(f"'{endpoint}' is no address", "Write HOST:PORT, for example 127.0.0.1:7447.")
+        raise ConfigError(f"'{endpoint}' is no address", f"Write HOST:PORT, for example {DEFAULT_ENDPOINT}.")
