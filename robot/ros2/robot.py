@@ -69,6 +69,7 @@ class Ros2Robot:
         }
         self._wheels: Publisher[Any] = bus.publisher(interface.topic(COMMANDED))
         self._newest: dict[str, Any] = {}
+        self._open = False
         self._seq = 0
         self._lock = threading.Lock()  # over the clock and what is sent
         self._clock = ClockEstimate()
@@ -94,9 +95,12 @@ class Ros2Robot:
             stamp = getattr(self._newest.get(name), "stamp_s", None)
             what = f"nothing comes on '{key}'" if stamp is None else f"what comes on '{key}' is stamped {stamp:.1f} s"
             raise DeviceError(what, BRIDGE if stamp is None else "Its driver has to stamp with the robot's own clock.")
+        self._open = True
 
     def read(self) -> Observation:
         """Return the newest of every sensor; what is older than its topic allows is None."""
+        if not self._open:
+            raise DeviceError("the robot is not open", "Call open() first.")
         news = self._listen()
         if self._seq == 0 or news:
             self._seq += 1
@@ -131,6 +135,7 @@ class Ros2Robot:
 
     def close(self) -> None:
         """Send zero. May be called twice."""
+        self._open = False
         with self._lock:
             for _ in range(FAREWELL):
                 try:

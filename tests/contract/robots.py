@@ -12,12 +12,17 @@ from tempfile import TemporaryDirectory
 import msgspec
 
 from lira.hal.bus.bus import Bus
+from lira.hal.bus.sensors import SENSORS
+from lira.hal.bus.topics import CMD_VEL
 from lira.hal.client.remote import RemoteArena, RemoteRobot
+from lira.hal.messages import Command, CourseState, Episode
+from lira.hal.messages.codec import encode
 from lira.hal.port import Arena, Robot
 from lira.hal.profile import Depth, load_profile
 from lira.hal.safety.governed import GovernedRobot
 from lira.hal.server.server import HalServer
 from lira.hal.testing import NullRobot
+from lira.robot.ros2.robot import Interface, Ros2Robot
 from lira.robot.rosbot import Devices, Rosbot
 from lira.robot.settings import BaseSettings, LidarSettings, Settings
 from lira.sim_backend.emulators.core2 import Firmware
@@ -44,6 +49,7 @@ class Rig:
     arena: Arena
     real_time: bool = False  # its time passes by itself
     stepped: bool = False  # its time passes with policy's commands only, a period each
+    stamps_s: float = 1e-6  # how far a stamp may be off: far from zero a float does not hold all nanoseconds
 
 
 @contextmanager
@@ -138,14 +144,69 @@ def rosbot_on_emulators() -> Iterator[Rig]:
             wired.close()
 
 
+class RosPeer:
+    """A null robot as ROS 2 shows one: messages without anything of ours beside them, and a twist drives it."""
+
+    def __init__(self, inner: NullRobot, bus: Bus) -> None:
+        self._inner, self._bus = inner, bus
+        self._commands = bus.reader(CMD_VEL, depth=16)
+        self._sent: dict[str, float] = {}
+        self._stop = threading.Event()
+        self._thread = threading.Thread(target=self._run)
+        self._thread.start()
+
+    def _run(self) -> None:
+        while not self._stop.wait(0.005):
+            for received in self._commands.poll():
+                self._inner.drive(Command(received.message, self._inner.now()))
+            seen = self._inner.read()
+            for sensor in SENSORS:
+                value = sensor.value(seen)
+                if value is not None and self._sent.get(sensor.name) != value.stamp_s:
+                    self._sent[sensor.name] = value.stamp_s
+                    message = value if sensor.compress is None else sensor.compress(value, PROFILE)
+                    self._bus.put_raw(sensor.topic, encode(message))
+
+    def reset(self, episode: Episode) -> None:
+        """Start afresh, and wait until what its sensors send belongs to the new episode."""
+        self._inner.reset(episode)
+        time.sleep(0.25)
+
+    def state(self) -> CourseState:
+        return self._inner.state()
+
+    def close(self) -> None:
+        self._stop.set()
+        self._thread.join()
+
+
+@contextmanager
+def null_over_ros() -> Iterator[Rig]:
+    name, endpoint = f"t{uuid.uuid4().hex}", f"127.0.0.1:{free_port()}"
+    far, near = Bus(name, listen=endpoint), Bus(name, connect=endpoint)
+    inner = NullRobot(PROFILE, time.monotonic, time.sleep)
+    peer = RosPeer(inner, far)
+    robot = GovernedRobot(Ros2Robot(PROFILE, near, Interface()))
+    try:
+        robot.open()
+        # It estimates the peer's clock from what comes, and takes nothing for later than that.
+        yield Rig(robot, inner, peer, real_time=True, stamps_s=0.05)
+    finally:
+        robot.close()
+        peer.close()
+        assert near.close()
+        assert far.close()
+
+
 # `real_time` and `stepped` robots by name: some promises make no sense for them.
-REAL_TIME = {"null over zenoh", "twin over zenoh", "rosbot on emulators"}
+REAL_TIME = {"null over zenoh", "twin over zenoh", "null over ROS 2", "rosbot on emulators"}
 STEPPED = {"null over zenoh in lockstep", "twin over zenoh in lockstep"}
 
 ROBOTS: dict[str, Callable[[], AbstractContextManager[Rig]]] = {
     "null": null,
     "null over zenoh": null_real_time,
     "null over zenoh in lockstep": null_lockstep,
+    "null over ROS 2": null_over_ros,
     "twin": twin,
     "twin over zenoh": twin_real_time,
     "twin over zenoh in lockstep": twin_lockstep,
