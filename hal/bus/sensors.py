@@ -83,6 +83,14 @@ def sensors_of(profile: RobotProfile) -> tuple[Sensor, ...]:
     return tuple(sensor for sensor in SENSORS if sensor.has(profile))
 
 
+def listened_to(profile: RobotProfile) -> tuple[Sensor, ...]:
+    """The rows that who is not at the robot itself listens to: of pictures only those that it has.
+
+    What is small costs nothing where nobody sends it, and a robot may measure more than its profile says.
+    """
+    return tuple(sensor for sensor in SENSORS if sensor.compress is None or sensor.has(profile))
+
+
 def observation_of(seq: int, now_s: float, newest: Mapping[str, Stamped | None]) -> Observation:
     """Put the newest values together, by the names of their sensors; what is stale at `now_s` is left out."""
     fields: dict[str, Any] = {}

@@ -3,7 +3,7 @@
 from typing import Any, Generic, TypeVar
 
 from lira.hal.bus.bus import Bus, Received
-from lira.hal.bus.sensors import Stamped, observation_of, sensors_of
+from lira.hal.bus.sensors import Stamped, listened_to, observation_of
 from lira.hal.bus.topics import Topic
 from lira.hal.clock import AHEAD_S, is_fresh
 from lira.hal.messages import Observation
@@ -51,10 +51,10 @@ class Sense(Generic[S]):
 
 
 class SensorReader:
-    """All sensors that a robot has by its profile."""
+    """All sensors of the robot of a profile."""
 
     def __init__(self, bus: Bus, profile: RobotProfile) -> None:
-        self._senses = [(sensor, Sense[Any](bus, sensor.topic)) for sensor in sensors_of(profile)]
+        self._senses = [(sensor, Sense[Any](bus, sensor.topic)) for sensor in listened_to(profile)]
 
     def forget(self, before_s: float) -> None:
         """Return nothing any more that was captured before that time, but for what outlives an episode."""

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 
 from lira.hal.bus.bus import Bus, Publisher, Reader
-from lira.hal.bus.sensors import SENSORS, observation_of, sensors_of
+from lira.hal.bus.sensors import SENSORS, listened_to, observation_of
 from lira.hal.bus.topics import CMD_VEL, SENSOR, Topic
 from lira.hal.clock import ClockEstimate, is_fresh
 from lira.hal.errors import BusError, ConfigError, DeviceError
@@ -65,7 +65,7 @@ class Ros2Robot:
         self._bus = bus
         self._interface = interface
         self._readers: dict[str, Reader[Any]] = {
-            sensor.name: bus.reader(interface.topic(sensor.name)) for sensor in sensors_of(profile)
+            sensor.name: bus.reader(interface.topic(sensor.name)) for sensor in listened_to(profile)
         }
         self._wheels: Publisher[Any] = bus.publisher(interface.topic(COMMANDED))
         self._newest: dict[str, Any] = {}
