@@ -13,8 +13,8 @@ from lira.hal.bus.bus import Received
 from lira.hal.bus.topics import APPLIED, SCAN
 from lira.hal.client.realtime import RealTimeLink
 from lira.hal.clock import SILENT_S
-from lira.hal.messages import HELD, STOP, Applied, Command, LaserScan, Reason, Source, Twist
-from lira.hal.safety.lease import session_of
+from lira.hal.messages import HELD, STOP, Applied, Command, LaserScan, Reason, Source, Twist, session_of
+from lira.hal.profile import load_profile
 
 OLD, NEW = 1000.0, 3.0  # what the clocks say
 GO = Twist(0.5, 0.0)
@@ -93,7 +93,7 @@ def bus():
 
 @pytest.fixture
 def link(bus):
-    link = RealTimeLink(bus, 0.25)
+    link = RealTimeLink(bus, load_profile("thesis-sim"))
     yield link
     link.close()
 

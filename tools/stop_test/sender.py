@@ -11,8 +11,7 @@ from typing import Any
 
 from lira.hal.bus.bus import Bus, Publisher
 from lira.hal.bus.topics import CMD_VEL, TELEOP
-from lira.hal.messages import Twist
-from lira.hal.safety.governor import is_neutral
+from lira.hal.messages import Twist, is_neutral
 from lira.tools.stop_test.journal import SENDERS, JournalWriter, Sent
 
 SENDER_RAD_S, TICK_RAD_S = 1e-4, 1e-13

@@ -14,11 +14,11 @@ import msgspec
 from lira.hal.bus.bus import Bus
 from lira.hal.bus.keys import VARIABLE as KEYS_VARIABLE
 from lira.hal.bus.keys import load_keys
+from lira.hal.bus.services import release_estop
 from lira.hal.bus.topics import APPLIED, DIAGNOSTICS, INFO, RESET
 from lira.hal.errors import BusError
 from lira.hal.messages import Episode, Source
 from lira.hal.profile import RobotProfile, load_profile
-from lira.hal.server.estop_service import release_estop
 from lira.tools.launch import link_fault as relay
 from lira.tools.launch.processes import ChildProcess, ProcessError, free_port
 from lira.tools.stop_test import driver, hand, launch, pulse, robot, world
