@@ -19,8 +19,8 @@ from lira.tools.stop_test.cull import cull, judge_mutant, rows_of
 from lira.tools.stop_test.journal import Heard, Journal, JournalReader, JournalWriter, Said, Sent, Truth, Wheels
 from lira.tools.stop_test.matrix import Matrix, missing
 from lira.tools.stop_test.mutants import MUTANTS, MutantError, break_product, swap
+from lira.tools.stop_test.parts.sender import Pen
 from lira.tools.stop_test.rows import ROWS
-from lira.tools.stop_test.sender import Pen
 from lira.tools.stop_test.setups import clock_library
 from lira.tools.stop_test.verdict import Bounds, Rules, judge, summarize
 

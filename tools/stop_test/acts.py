@@ -12,7 +12,7 @@ from lira.hal.errors import LiraError
 from lira.hal.server.estop_service import press_estop, release_estop
 from lira.tools.launch.link_fault import LinkFaults, Relay
 from lira.tools.launch.processes import ChildProcess
-from lira.tools.stop_test.intruder import Intruder
+from lira.tools.stop_test.parts.intruder import Intruder
 
 LEASE_GONE_S = 1.2
 HOUR_S = 3600

@@ -21,12 +21,12 @@ from lira.hal.profile import RobotProfile, load_profile
 from lira.hal.server.estop_service import release_estop
 from lira.tools.launch import link_fault as relay
 from lira.tools.launch.processes import ChildProcess, ProcessError, free_port
-from lira.tools.stop_test import driver, hand, launch, pulse, robot, world
 from lira.tools.stop_test.acts import StopTestError
 from lira.tools.stop_test.control import ASK_TIME, TIME, tell
-from lira.tools.stop_test.intruder import Intruder
 from lira.tools.stop_test.journal import Journal, JournalReader
 from lira.tools.stop_test.mutants import Mutant
+from lira.tools.stop_test.parts import driver, hand, launch, pulse, robot, world
+from lira.tools.stop_test.parts.intruder import Intruder
 from lira.tools.stop_test.setups import BRIEF, LAPTOP, Setup, clock_library
 
 if TYPE_CHECKING:

@@ -1,6 +1,6 @@
 """What a trial's journal says: how soon it stood, how far it went, what it obeyed, and whether it moved unasked. Pure.
 
-Whose motion the wheels had, and how old it was, is found by the mark on each command (`sender.py`) in the senders' own
+Whose motion the wheels had, and how old it was, is found by the mark on each command (`parts/sender.py`) in the senders' own
 logs. Motion that is in nobody's log was asked by nobody.
 """
 

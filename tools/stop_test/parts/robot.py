@@ -2,7 +2,7 @@
 
 That is a twin, or, with the folder of a world's devices, the physical robot's drivers.
 
-python -m lira.tools.stop_test.robot NAME HOST:PORT PROFILE JOURNAL CONTROL_PORT [FOLDER CAMERA_URL]
+python -m lira.tools.stop_test.parts.robot NAME HOST:PORT PROFILE JOURNAL CONTROL_PORT [FOLDER CAMERA_URL]
 """
 
 import signal

@@ -21,8 +21,8 @@ from lira.hal.errors import BusError
 from lira.hal.messages import STOP, Applied, Twist
 from lira.hal.messages.codec import encode
 from lira.hal.server.estop_service import look_at_estop, release_estop
-from lira.tools.stop_test import flood
-from lira.tools.stop_test.sender import Pen
+from lira.tools.stop_test.parts import flood
+from lira.tools.stop_test.parts.sender import Pen
 
 if TYPE_CHECKING:
     from lira.tools.stop_test.keyring import Keyring

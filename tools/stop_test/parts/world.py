@@ -3,7 +3,7 @@
 It goes on whatever happens to the robot's process. Control messages: `reset` puts the robot back to its start; `well`
 mends all; the others are the names in `Devices.break_`.
 
-python -m lira.tools.stop_test.world PROFILE JOURNAL CONTROL_PORT FOLDER
+python -m lira.tools.stop_test.parts.world PROFILE JOURNAL CONTROL_PORT FOLDER
 """
 
 import sys
@@ -23,7 +23,7 @@ from lira.sim_backend.emulators.wired_twin import WiredTwin
 from lira.sim_backend.polyline import Floats
 from lira.tools.stop_test.control import listen
 from lira.tools.stop_test.journal import JournalWriter
-from lira.tools.stop_test.robot import NotedTwin, keep_truth, small_pictures
+from lira.tools.stop_test.parts.robot import NotedTwin, keep_truth, small_pictures
 
 READY = "devices, camera at "
 NEAR_M = 0.15  # in front of the lidar: inside the protective field
