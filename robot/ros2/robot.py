@@ -112,9 +112,12 @@ class Ros2Robot:
         return self._observation
 
     def drive(self, command: Command) -> Applied:
-        """Send a velocity, at once if it is new, else at 20 Hz."""
-        twist, now_s = command.twist, self.now()
+        """Send a velocity, at once if it is new, else at 20 Hz; zero if it was decided too long ago by now."""
+        twist = command.twist
         with self._lock:
+            now_s = self._now()  # not before: whoever waited for the lock would take an old command for a new one
+            if now_s - command.stamp_s > self._profile.control.robot_timeout_s:
+                twist = STOP
             due = twist != self._sent or time.monotonic() - self._sent_s >= SEND_S
             if due:
                 self._send(twist, now_s)
@@ -128,7 +131,7 @@ class Ros2Robot:
     def now(self) -> float:
         """Seconds on the robot's ROS clock, late by the shortest way of a message; 0 before there was any."""
         with self._lock:
-            return self._clock.now(time.monotonic()) if self._clock.known else 0.0
+            return self._now()
 
     def wait(self, until_s: float) -> None:
         """Sleep."""
@@ -143,13 +146,16 @@ class Ros2Robot:
         with self._lock:
             for _ in range(FAREWELL):
                 try:
-                    self._send(STOP, self._clock.now(time.monotonic()) if self._clock.known else 0.0)
+                    self._send(STOP, self._now())
                 except BusError:
                     return
 
     def troubles(self) -> dict[str, str]:
         """What is missing, each with its remedy."""
         return {name: f"'{self._interface.topic(name).key}' is silent. {BRIDGE}" for name in self._silent()}
+
+    def _now(self) -> float:
+        return self._clock.now(time.monotonic()) if self._clock.known else 0.0
 
     def _send(self, twist: Twist, now_s: float) -> None:
         self._sent, self._sent_s = twist, time.monotonic()

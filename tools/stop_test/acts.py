@@ -18,7 +18,8 @@ LEASE_GONE_S = 1.2
 HOUR_S = 3600
 CREEP_S, CREEPS = 0.02, 30
 STEP_S = 0.05
-RECORD_S = 1.0
+RECORD_S, REPLAY_S = 1.0, 0.02
+RECORDED, LAST = 10, 5  # datagrams: some twenty commands are under way in a second
 ENDED_S = 8.0
 
 
@@ -188,7 +189,7 @@ def rival(bench: Bench) -> None:
 
 
 def forge(ahead_s: float) -> Act:
-    """Let somebody command in the commander's name, with stamps of so much ahead of now."""
+    """Let somebody command with a copy of all that the robot tells of its commander, stamped so much ahead of now."""
     return lambda bench: bench.intruder.forge(ahead_s)
 
 
@@ -212,11 +213,23 @@ def release_as(name: str) -> Act:
     return lambda bench: bench.intruder.release_as(name)
 
 
+def put_in_name(who: str, name: str) -> Act:
+    """Let somebody command in another's name who has a certificate to drive in an own one."""
+    return lambda bench: bench.intruder.put_in_name(who, name)
+
+
 def replay(bench: Bench) -> None:
-    """Record what the commander says, freeze it, and say all of it again."""
-    bench.intruder.record(RECORD_S)
+    """Record the datagrams of the commander, freeze it, and send all of them again, the last again and again.
+
+    Commands are passed on to nobody, so that can be done in the link alone. Raises `StopTestError` if that had none.
+    """
+    recorded = bench.relay.record(RECORD_S)
     bench.driver.signal(signal.SIGSTOP)
-    bench.intruder.replay_recorded()
+    if len(recorded) < RECORDED:
+        raise StopTestError(f"the link had {len(recorded)} datagrams of the commander", "Does UDP get through?")
+    for again in [*recorded[-LAST:], *recorded, *recorded[-LAST:]]:
+        again()
+        time.sleep(REPLAY_S)
 
 
 def wait_expired(bench: Bench) -> None:

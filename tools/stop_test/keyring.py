@@ -14,13 +14,13 @@ from lira.hal.bus.keys import CERTIFICATE, KEY
 from lira.tools.authority import AUTHORITY
 from lira.tools.launch.processes import lira_command
 from lira.tools.stop_test.acts import StopTestError
-from lira.tools.stop_test.setups import BRIEF, GUEST, LEAVER
+from lira.tools.stop_test.setups import BRIEF, GUEST, LEAVER, RIVAL
 
 BRIEF_S, PATIENCE_S = 10.0, 20.0
 
 
 class Keyring:
-    """Bundles for a robot and some peers: a guest may only look, who is brief does not stay, a leaver is shut out.
+    """Bundles for a robot and some peers: a guest only looks, who is brief does not stay, a leaver is shut out.
 
     Raises `StopTestError` if `lira keys` does not do what it should.
     """
@@ -30,7 +30,7 @@ class Keyring:
         self._expires = datetime.now(UTC)
         lira_keys("init", str(folder))
         lira_keys("enroll", GUEST, str(folder), "--viewer")
-        for name in (BRIEF, LEAVER):
+        for name in (RIVAL, BRIEF, LEAVER):
             lira_keys("enroll", name, str(folder))
 
     def prepare(self, name: str) -> Path:

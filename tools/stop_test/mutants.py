@@ -70,13 +70,13 @@ def rewrite(*changes: tuple[str, str, str]) -> Callable[[], None]:
     """Change the governor's table: in this state, this event leads to that state, and motion is allowed there."""
 
     def break_() -> None:
-        governor = import_module("lira.hal.safety.governor")
-        table = governor.TRANSITIONS
-        keys = {(str(state), str(event)): (state, event) for state, event in table}
+        from lira.hal.safety.arming import TRANSITIONS, State
+
+        keys = {(str(state), str(event)): (state, event) for state, event in TRANSITIONS}
         for state, event, then in changes:
             if (state, event) not in keys:
-                raise MutantError(f"the governor's table has no {event} of {state}", "Write this mutant anew.")
-            table[keys[state, event]] = (governor.State(then), Reason.OK)
+                raise MutantError(f"the table of arming has no {event} of {state}", "Write this mutant anew.")
+            TRANSITIONS[keys[state, event]] = (State(then), Reason.OK)
 
     return break_
 
@@ -179,11 +179,12 @@ def run_ahead() -> None:
 
 def arm_by_an_idle_hand() -> None:
     """Take the zero of a hand that has let go for a wish to drive."""
+    from lira.hal.safety.arming import Event
     from lira.hal.safety.governor import Governor
 
     def arm(_: None, governor: Any, command: Any, *__: Any) -> None:
         if command.source is Source.TELEOP and command.released:
-            governor._fire(import_module("lira.hal.safety.governor").Event.NEUTRAL)
+            governor._fire(Event.NEUTRAL)
 
     after(Governor, "_accept", arm)
 
@@ -201,6 +202,25 @@ def poll_for_ever() -> None:
     old = swap(bus.Bus, "reader", None)
     bus.Bus.reader = lambda self, topic, *_: old(self, replace(topic, max_bytes=1 << 30), 1 << 15)
     swap(import_module("lira.hal.bus.zenoh_session"), "_size_limits", lambda *_: [])
+
+
+def tell_epochs() -> None:
+    """Tell everybody the very number by which a commander's session is known."""
+    swap(import_module("lira.hal.safety.governor"), "session_of", lambda epoch: epoch)
+
+
+def trust_names() -> None:
+    """Let every operator command in whatever name it likes."""
+
+    def widen(access: dict[str, Any], robot: str, *_: Any) -> dict[str, Any]:
+        own = [rule for rule in access["rules"] if rule["id"].startswith("drive as")]
+        if not own:
+            raise MutantError("nobody on the access list drives in an own name", "Write this mutant anew.")
+        for rule in own:
+            rule["key_exprs"] = [f"{robot}/cmd_vel/by/*"]
+        return access
+
+    after(import_module("lira.hal.bus.zenoh_session"), "access_list", widen)
 
 
 def promote_viewers() -> None:
@@ -258,6 +278,8 @@ MUTANTS = (
     Mutant("a lost device is not missed", never_miss_a_device, ("board reset, up after 1.1 s",)),
     Mutant("a device that is back arms", rewrite(("lost", "found", "armed")), ("board reset, up after 1.1 s",)),
     Mutant("a poll has no end", poll_for_ever, ("flood of commands",)),
+    Mutant("a commander's session is no secret", tell_epochs, ("lease copied",)),
+    Mutant("a name is what its sender says", trust_names, ("put in the commander's name with another's certificate",)),
     Mutant("a viewer may do all", promote_viewers, ("emergency stop released by a viewer",)),
     Mutant("links outlive their certificates", keep_expired_links, ("certificate runs out",)),
     Mutant("who is revoked stays", never_read_keys_again, ("name revoked",)),

@@ -3,7 +3,8 @@
 from dataclasses import dataclass
 from pathlib import Path
 
-LAPTOP, GUEST, BRIEF, LEAVER = "laptop", "guest", "brief", "leaver"  # names on certificates, where there are keys
+# Names on certificates, where there are keys.
+LAPTOP, RIVAL, GUEST, BRIEF, LEAVER = "laptop", "rival", "guest", "brief", "leaver"
 LIBRARIES = "/usr/lib/*/faketime/libfaketimeMT.so.1", "/usr/lib*/faketime/libfaketimeMT.so.1"
 
 

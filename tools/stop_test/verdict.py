@@ -1,7 +1,7 @@
 """What a trial's journal says: how soon it stood, how far it went, what it obeyed, and whether it moved unasked. Pure.
 
-Whose motion the wheels had, and how old it was, is found by the mark on each command (`parts/sender.py`) in the senders' own
-logs. Motion that is in nobody's log was asked by nobody.
+Whose motion the wheels had, and how old it was, is found by the mark on each command (`parts/sender.py`) in the
+senders' own logs. Motion that is in nobody's log was asked by nobody.
 """
 
 import math

@@ -14,9 +14,9 @@ from typing import TYPE_CHECKING
 import zenoh
 
 from lira.hal.bus.attachment import Attachment
-from lira.hal.bus.bus import Bus, Received
+from lira.hal.bus.bus import Bus, Publisher
 from lira.hal.bus.keys import load_keys
-from lira.hal.bus.topics import APPLIED, CMD_VEL, TELEOP
+from lira.hal.bus.topics import APPLIED, CMD_VEL, TELEOP, Topic, named
 from lira.hal.errors import BusError
 from lira.hal.messages import STOP, Applied, Twist
 from lira.hal.messages.codec import encode
@@ -32,9 +32,7 @@ PAUSE_S = 0.02
 IDLE_S = 0.05
 BACK = Twist(-0.1, 0.0)
 WAIT_S, RELEASE_S = 5.0, 0.5
-EAVESDROP_S = 0.3
 AHEAD = 40  # messages: numbers that the commander will come to within a few seconds
-DEPTH = 256
 PLAIN = {
     "mode": '"peer"',
     "connect/timeout_ms": "0",
@@ -53,7 +51,6 @@ class Intruder:
         self._pen, self._thumb = Pen(journal, "intruder"), Pen(journal, "joystick")
         self._publisher = bus.publisher(CMD_VEL)
         self._applied = bus.reader(APPLIED)
-        self._recorded: list[Received[Twist]] = []
         self._ended = threading.Event()
         self._background: list[threading.Thread] = []
         self._floods: list[subprocess.Popen[bytes]] = []
@@ -67,33 +64,11 @@ class Intruder:
         self._repeat(lambda: self._publisher.put(self._pen.mark(BACK), self._hear().stamp_s))
 
     def forge(self, ahead_s: float) -> None:
-        """Command in the commander's name, as whoever listens to it can, with stamps of so much ahead of now."""
-        self.record(EAVESDROP_S)
-        sent = [received.attachment for received in self._recorded if received.attachment is not None]
-        self._recorded = []
-        epoch, seq = (sent[-1].epoch, sent[-1].seq) if sent else (0, 0)
-        numbers = count(seq + AHEAD)
-        self._repeat(lambda: self._say_as(epoch, next(numbers), self._hear().stamp_s + ahead_s))
-
-    def record(self, for_s: float) -> None:
-        """Listen to what the commander says, as whoever is let in as a watcher may."""
-        watch = Bus(self._bus.robot, connect=self._bus.endpoint, watch=True)
-        reader, until_s = watch.reader(CMD_VEL, DEPTH), time.monotonic() + for_s
-        while time.monotonic() < until_s:
-            self._recorded += reader.poll()
-            time.sleep(PAUSE_S)
-        watch.close()
-
-    def replay_recorded(self) -> None:
-        """Say all of it again, and the last word again and again, at once and later."""
-        recorded, self._recorded = self._recorded, []
-        if not recorded:
-            raise TimeoutError("nothing was recorded of what the commander says")
-        last = recorded[-1:] * TIMES
-        for received in [*last, *recorded, *last]:
-            attached = None if received.attachment is None else received.attachment.to_bytes()
-            self._bus.put_raw(CMD_VEL, encode(received.message), attached)
-            time.sleep(PAUSE_S)
+        """Command in the commander's place, with a copy of all that the robot tells of it: the session and numbers that
+        it will come to, with stamps of so much ahead of now.
+        """
+        numbers = count(self._hear().seq + AHEAD)
+        self._repeat(lambda: self._say(CMD_VEL, self._bus, told := self._hear(), next(numbers), told.stamp_s + ahead_s))
 
     def take_lease(self) -> None:
         """Become the commander, and stand."""
@@ -146,10 +121,18 @@ class Intruder:
     def put_as(self, who: str) -> None:
         """Put with the certificate of another peer."""
         bus = self._session_of(who)
-        publisher, deadline_s = bus.publisher(CMD_VEL), time.monotonic() + WAIT_S
-        while not publisher.matching and time.monotonic() < deadline_s:
-            time.sleep(PAUSE_S)
+        publisher = bus.publisher(CMD_VEL)
+        self._wait_heard(publisher)
         self._repeat(lambda: publisher.put(self._pen.mark(BACK), self._hear().stamp_s))
+        bus.close()
+
+    def put_in_name(self, who: str, name: str) -> None:
+        """Put in somebody's name, with the certificate of another who may drive, and all that the robot tells."""
+        bus = self._session_of(who)
+        self._wait_heard(bus.publisher(CMD_VEL))
+        numbers = count(self._hear().seq + AHEAD)
+        topic = named(CMD_VEL, name)
+        self._repeat(lambda: self._say(topic, bus, told := self._hear(), next(numbers), told.stamp_s))
         bus.close()
 
     def release_as(self, who: str) -> None:
@@ -165,9 +148,18 @@ class Intruder:
         assert self._keyring is not None
         return Bus(self._bus.robot, connect=self._bus.endpoint, keys=load_keys(self._keyring.prepare(who)))
 
-    def _say_as(self, epoch: int, seq: int, stamp_s: float) -> None:
-        attachment = Attachment(epoch, seq, round(max(stamp_s, 0.0) * 1e9))
-        self._bus.put_raw(CMD_VEL, encode(self._pen.mark(BACK)), attachment.to_bytes())
+    def _wait_heard(self, publisher: Publisher[Twist]) -> None:
+        """Wait until the robot listens to it: what is put before goes nowhere, and proves nothing."""
+        deadline_s = time.monotonic() + WAIT_S
+        while not publisher.matching:
+            if time.monotonic() > deadline_s:
+                raise TimeoutError("the robot does not listen to the intruder")
+            time.sleep(PAUSE_S)
+
+    def _say(self, topic: Topic[Twist], bus: Bus, told: Applied, seq: int, stamp_s: float) -> None:
+        """Command as if in the session of which the robot tells."""
+        attachment = Attachment(told.session, seq, round(max(stamp_s, 0.0) * 1e9))
+        bus.put_raw(topic, encode(self._pen.mark(BACK)), attachment.to_bytes())
 
     def _repeat(self, act: Callable[[], None]) -> None:
         for _ in range(TIMES):
