@@ -119,7 +119,7 @@ def _rules(bench: ProcessBench, row: Row, broken_s: float, mended_s: float) -> R
         end_s=mended_s,
         drives=row.drives,
         # Below the governor the wheels keep what they have until somebody tells them otherwise: the budget bounds that.
-        stale_s=row.budget_s if row.setup.drivers else timeout_s + TICK_S,
+        stale_s=row.budget_s if row.setup.world else timeout_s + TICK_S,
         resumes=row.resumes,
         renews=row.renews,
         shut_out_s=float("inf") if row.shut_out_s is None else broken_s + row.shut_out_s,

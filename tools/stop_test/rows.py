@@ -35,13 +35,26 @@ from lira.tools.stop_test.setups import (
     LEAVER,
     LINK,
     RIVAL,
+    ROS2,
     TWIN,
     Setup,
 )
-from lira.tools.stop_test.verdict import BASE, BOARD, DRIVER, ESTOP, FAREWELL, FIELD, GUARD, REFUSAL, WATCHDOG
+from lira.tools.stop_test.verdict import (
+    BASE,
+    BOARD,
+    CONTROLLER,
+    DRIVER,
+    ESTOP,
+    FAREWELL,
+    FIELD,
+    GUARD,
+    REFUSAL,
+    WATCHDOG,
+)
 
 BUDGET_S = 0.35
 WATCHED_S = 0.7  # a device that fell silent has to be found out first
+CONTROLLER_S = 0.6  # a ROS 2 robot's own time-out, 0.5 s as usual: nothing of ours runs there
 DRIVERS_S = 0.45  # below the governor: the base driver waits 0.30 s, the guard 0.20 s after the last byte it heard
 FIRMWARE_S = 1.2  # nobody is left but the board's own watchdog, 1.0 s after the last command it had
 
@@ -219,10 +232,9 @@ ROWS = (
         trials=1),
     Row("board heard no more", one_by_one(INSIST, world_does("board mute")), REPAIRED, hold_s=2.5,
         stopped_by=NO_DEVICE, budget_s=WATCHED_S, within_s=WATCHED_S, below=BASE, setup=DRIVERS),
-    # The board does not say that it hears nothing, so nobody here can know when it hears again: the commander leaves.
-    Row("board hears no more", one_by_one(INSIST, world_does("board deaf")),
-        one_by_one(driver_does("leave"), pause(0.5), REPAIRED), hold_s=1.5,
-        stopped_by=(BOARD,), budget_s=FIRMWARE_S, within_s=FIRMWARE_S, below=BOARD, setup=DRIVERS),
+    # Only the firmware's watchdog can stop such a board; meanwhile the driver has found out, and holds whoever insists.
+    Row("board hears no more", one_by_one(INSIST, world_does("board deaf")), REPAIRED, hold_s=1.5,
+        stopped_by=(BOARD, *NO_DEVICE), budget_s=FIRMWARE_S, within_s=FIRMWARE_S, below=BOARD, setup=DRIVERS),
     Row("board lost for less than a tick", one_by_one(INSIST, world_does("board mute until asked")), hold_s=3.0,
         stopped_by=NO_DEVICE, budget_s=WATCHED_S, within_s=WATCHED_S, below=BASE, setup=DRIVERS, trials=1),
     Row("lidar mute, then something in the way, and away", one_by_one(INSIST, world_does("lidar mute")),
@@ -232,6 +244,13 @@ ROWS = (
         one_by_one(REPAIRED, OBSTACLE), hold_s=1.0, stopped_by=NO_DEVICE, within_s=WATCHED_S, setup=DRIVERS,
         trials=1),
     flooded("samples of 1 MB", DRIVERS),
+    # A robot that runs ROS 2.
+    Row("commander killed (kill -9) on a robot that runs ROS 2", KILL, setup=ROS2, trials=1),
+    flooded("samples of 1 MB", ROS2),
+    Row("lira ros2 killed (kill -9)", acts.robot_signal(signal.SIGKILL), acts.restart_robot,
+        stopped_by=(CONTROLLER,), budget_s=CONTROLLER_S, below=CONTROLLER, setup=ROS2, trials=1),
+    Row("lira ros2 frozen (SIGSTOP)", ROBOT_FREEZE, ROBOT_THAW, hold_s=1.6, stopped_by=(CONTROLLER,),
+        budget_s=CONTROLLER_S, below=CONTROLLER, setup=ROS2),
     # The time of day.
     clock_set("robot", HOUR_S, "ahead"),
     clock_set("robot", -HOUR_S, "behind"),

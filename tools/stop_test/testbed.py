@@ -7,6 +7,7 @@ import time
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
+from types import ModuleType
 from typing import TYPE_CHECKING
 
 import msgspec
@@ -25,7 +26,7 @@ from lira.tools.stop_test.acts import StopTestError
 from lira.tools.stop_test.control import ASK_TIME, TIME, tell
 from lira.tools.stop_test.journal import Journal, JournalReader
 from lira.tools.stop_test.mutants import Mutant
-from lira.tools.stop_test.parts import driver, hand, launch, pulse, robot, world
+from lira.tools.stop_test.parts import driver, hand, launch, pulse, robot, ros2_world, world
 from lira.tools.stop_test.parts.intruder import Intruder
 from lira.tools.stop_test.setups import BRIEF, LAPTOP, Setup, clock_library
 
@@ -44,7 +45,7 @@ ANSWER_S = 5.0
 RELEASE_S = 1.0
 POLL_S = 0.02
 POLICY, HAND, ROBOT, WORLD, LINK, PULSE = "policy", "hand", "robot", "world", "link", "pulse"
-READY = {POLICY: driver.READY, HAND: hand.READY, ROBOT: robot.READY, WORLD: world.READY}
+TOLD = (POLICY, HAND, ROBOT, WORLD)  # who takes control messages
 NOTED = {HAND: "hand"}  # a driver notes by itself what it sends
 
 
@@ -57,15 +58,17 @@ class ProcessBench:
         self.profile: RobotProfile = load_profile(self._profile_name)
         self.name, self._port, self._front = f"stop_{free_port()}", free_port(), free_port()
         self._journal = JournalReader(folder / "journal")
-        self._ports = {role: free_port() for role in READY}
+        self._ports = {role: free_port() for role in TOLD}
         self._running: dict[str, ChildProcess] = {}
         self._tested, self._runs, self._certificate = POLICY, 0, LAPTOP
         self._keyring = _make_keys(folder / "keys") if setup.keys else None
         command = [sys.executable, "-m", pulse.__name__, str(self._journal.folder)]
         self._run(PULSE, command, pulse.READY)
-        if setup.drivers:
-            words = [self._profile_name, str(self._journal.folder), str(self._ports[WORLD]), str(folder)]
-            self._run_module(WORLD, world.__name__, words)
+        self._bridge = free_port()
+        if setup.world:
+            words = [self._profile_name, str(self._journal.folder), str(self._ports[WORLD])]
+            words.append(str(self._bridge if setup.ros2 else folder))
+            self._run_module(WORLD, ros2_world if setup.ros2 else world, words)
         self.restart_robot()
         behind = self._port
         if setup.link:
@@ -119,7 +122,9 @@ class ProcessBench:
         words += [str(self._journal.folder), str(self._ports[ROBOT])]
         if self._setup.drivers:
             words += [str(self._folder), self._running[WORLD].output().partition(world.READY)[2].split()[0]]
-        self._run_module(ROBOT, robot.__name__, words)
+        elif self._setup.ros2:
+            words.append(str(self._bridge))
+        self._run_module(ROBOT, robot, words)
 
     def restart_link(self) -> None:
         """Start the process in the link."""
@@ -156,7 +161,7 @@ class ProcessBench:
         """Put the robot back to its start and get it going. Raises `StopTestError` if it does not."""
         self._tested = HAND if by_hand else POLICY
         self._journal.skip()
-        if self._setup.drivers:
+        if self._setup.world:
             tell(self._ports[WORLD], "reset")
             time.sleep(SETTLE_S)
         else:
@@ -238,12 +243,12 @@ class ProcessBench:
                 self._run_driver()
             else:
                 words = [self.name, f"127.0.0.1:{self._front}", str(self._ports[HAND])]
-                self._run_module(HAND, hand.__name__, words)
+                self._run_module(HAND, hand, words)
         tell(self._ports[role], "go")
 
     def _run_driver(self) -> None:
         words = [self.name, f"127.0.0.1:{self._front}", str(self._ports[POLICY]), str(self._journal.folder)]
-        self._run_module(POLICY, driver.__name__, words)
+        self._run_module(POLICY, driver, words)
 
     def _wait_until_it_drives(self, role: str) -> None:
         began_s = told_s = time.monotonic()
@@ -264,8 +269,8 @@ class ProcessBench:
         newest = self._applied.newest()
         return Source.NONE if newest is None else newest.message.source
 
-    def _run_module(self, role: str, module: str, words: list[str]) -> None:
-        self._run(role, self._python(role, module, words, NOTED.get(role)), READY[role])
+    def _run_module(self, role: str, module: ModuleType, words: list[str]) -> None:
+        self._run(role, self._python(role, module.__name__, words, NOTED.get(role)), module.READY)
 
     def _run(self, role: str, command: list[str], ready: str) -> None:
         process = self._stack.enter_context(ChildProcess(role, command, self._folder / f"{role}.log"))

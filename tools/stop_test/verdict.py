@@ -21,11 +21,9 @@ REACH_S = 0.15  # between the governor's word and the wheels, at most
 # What may stop a robot, by the governor's reason.
 WATCHDOG, REFUSAL, ESTOP, FIELD = "watchdog", "refusal", "e-stop", "protective field"
 DRIVER, FAREWELL, HELD = "zero commanded", "commander left", "neutral first"
-GUARD, BASE, BOARD = (
-    "base's guard process",
-    "base driver's watchdog",
-    "base board",
-)  # the governor knows nothing of these
+# The governor knows nothing of these.
+GUARD, BASE, BOARD = "base's guard process", "base driver's watchdog", "base board"
+CONTROLLER = "robot's own controller"
 STOPPERS: dict[Reason, str] = {
     Reason.STALE: WATCHDOG,
     Reason.REFUSED: REFUSAL,
