@@ -260,6 +260,7 @@ ROWS = (
     Row("put without a certificate", acts.put_plainly, silence=True, refusal=("links",), setup=KEYED),
     Row("put with a viewer's certificate", acts.put_as(GUEST), silence=True,
         refusal=("messages",), setup=KEYED),
+    Row("datagrams recorded and replayed where there are keys", acts.replay, THAW, setup=KEYED, trials=1),
     Row("put with another operator's certificate", acts.put_as(RIVAL), silence=True,
         refusal=("another commander",), setup=KEYED),
     Row("put in the commander's name with another's certificate", acts.put_in_name(RIVAL, LAPTOP), silence=True,
