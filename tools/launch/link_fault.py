@@ -41,6 +41,14 @@ class LinkFaults:
     narrow_byte_s: float = math.inf
 
 
+@dataclass(frozen=True, slots=True)
+class Datagram:
+    """One that went to the robot; `send` sends it there again, on the relay's thread."""
+
+    data: bytes
+    send: Callable[[], None]
+
+
 class Narrows:
     """How long what goes through has to wait, where only so much fits. Pure; the time comes in."""
 
@@ -69,7 +77,7 @@ class Relay:
         self._ready = threading.Event()
         self._streams: set[asyncio.StreamWriter] = set()
         self._datagrams: list[asyncio.BaseTransport] = []
-        self._recorded: list[Callable[[], None]] | None = None
+        self._recorded: list[Datagram] | None = None
         self._tasks: set[asyncio.Task[None]] = set()
         self._thread = threading.Thread(target=self._run, name="relay", daemon=True)
 
@@ -87,17 +95,21 @@ class Relay:
         """Break every stream that is open."""
         self._loop.call_soon_threadsafe(self._abort)
 
-    def record(self, for_s: float) -> list[Callable[[], object]]:
-        """Record what goes to the robot as datagrams; each of the result sends one of them again, oldest first."""
+    def record(self, for_s: float) -> list[Datagram]:
+        """Record what goes to the robot as datagrams, oldest first."""
         recorded = self._recorded = []
         time.sleep(for_s)
         self._recorded = None
-        return [partial(self._loop.call_soon_threadsafe, again) for again in recorded]
+        return recorded
 
-    def note(self, again: Callable[[], None]) -> None:
-        """Remember how to send one again, while recording."""
+    def replay(self, datagram: Datagram) -> None:
+        """Send one to the robot again."""
+        self._loop.call_soon_threadsafe(datagram.send)
+
+    def note(self, datagram: Datagram) -> None:
+        """Keep one, while recording."""
         if (recorded := self._recorded) is not None:
-            recorded.append(again)
+            recorded.append(datagram)
 
     def _abort(self) -> None:
         for stream in self._streams:
@@ -180,7 +192,7 @@ class _Front(asyncio.DatagramProtocol):
             self._relay.start(self._connect(addr, data))
         else:
             self._far[addr].send(data)
-            self._relay.note(partial(self._far[addr].send, data))
+            self._relay.note(Datagram(data, partial(self._far[addr].send, data)))
 
     async def _connect(self, addr: tuple[str, int], first: bytes) -> None:
         loop = asyncio.get_running_loop()

@@ -19,7 +19,7 @@ HOUR_S = 3600
 CREEP_S, CREEPS = 0.02, 30
 STEP_S = 0.05
 RECORD_S, REPLAY_S = 1.0, 0.02
-RECORDED, LAST = 10, 5  # datagrams: some twenty commands are under way in a second
+RECORDED, LAST = 10, 5  # some twenty commands are under way in a second
 ENDED_S = 8.0
 
 
@@ -218,18 +218,30 @@ def put_in_name(who: str, name: str) -> Act:
     return lambda bench: bench.intruder.put_in_name(who, name)
 
 
-def replay(bench: Bench) -> None:
-    """Record the datagrams of the commander, freeze it, and send all of them again, the last again and again.
+def replay_commands(bench: Bench) -> None:
+    """Freeze the commander, and say again what it said, byte for byte, in another session.
 
-    Commands are passed on to nobody, so that can be done in the link alone. Raises `StopTestError` if that had none.
+    Commands are passed on to nobody, and keys hide them: this takes somebody in the link of a robot without any.
+    Raises `StopTestError` if too little was recorded.
     """
     recorded = bench.relay.record(RECORD_S)
     bench.driver.signal(signal.SIGSTOP)
-    if len(recorded) < RECORDED:
-        raise StopTestError(f"the link had {len(recorded)} datagrams of the commander", "Does UDP get through?")
-    for again in [*recorded[-LAST:], *recorded, *recorded[-LAST:]]:
-        again()
+    _require(bench.intruder.repeat([one.data for one in recorded]), "commands")
+
+
+def replay_datagrams(bench: Bench) -> None:
+    """Freeze the commander, and send again the datagrams of its link. Raises `StopTestError` if there were too few."""
+    recorded = bench.relay.record(RECORD_S)
+    bench.driver.signal(signal.SIGSTOP)
+    for one in [*recorded[-LAST:], *recorded, *recorded[-LAST:]]:
+        bench.relay.replay(one)
         time.sleep(REPLAY_S)
+    _require(len(recorded), "datagrams")
+
+
+def _require(count: int, what: str) -> None:
+    if count < RECORDED:
+        raise StopTestError(f"only {count} {what} of the commander were recorded", "Does UDP get through?")
 
 
 def wait_expired(bench: Bench) -> None:

@@ -109,6 +109,12 @@ def obey_by_arrival() -> None:
     setattr(Governor, "submit", lambda governor, command, now_s: old(governor, replace(command, stamp_s=now_s), now_s))  # noqa: B010
 
 
+def obey_repeats() -> None:
+    """Take what was said before for something new."""
+    swap(import_module("lira.hal.server.command_reader").Order, "is_new", lambda *_: True)
+    obey_by_arrival()
+
+
 def wait_longer() -> None:
     """Let a command drive for two seconds."""
     from lira.hal.safety.governor import Governor
@@ -258,6 +264,7 @@ MUTANTS = (
     ),
     Mutant("releasing the emergency stop arms", rewrite(("emergency", "released", "armed")), ("emergency stop",)),
     Mutant("age counts from arrival", obey_by_arrival, ("link delayed more and more",)),
+    Mutant("a repeat is obeyed", obey_repeats, ("commands recorded and replayed",)),
     Mutant("late commands are taken", without_objection("late", "out of order"), ("stamps an hour behind",)),
     Mutant("commands of three seconds ahead are obeyed", constant("lira.hal.safety.governor", "AHEAD_S", 3.0),
            ("stamps half a second ahead",)),

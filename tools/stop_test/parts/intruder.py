@@ -6,14 +6,14 @@ import subprocess
 import sys
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from itertools import count
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import zenoh
 
-from lira.hal.bus.attachment import Attachment
+from lira.hal.bus.attachment import MAGIC, Attachment
 from lira.hal.bus.bus import Bus, Publisher
 from lira.hal.bus.keys import load_keys
 from lira.hal.bus.topics import APPLIED, CMD_VEL, TELEOP, Topic, named
@@ -33,6 +33,7 @@ IDLE_S = 0.05
 BACK = Twist(-0.1, 0.0)
 WAIT_S, RELEASE_S = 5.0, 0.5
 AHEAD = 40  # messages: numbers that the commander will come to within a few seconds
+CDR_HEADER = 4  # bytes
 PLAIN = {
     "mode": '"peer"',
     "connect/timeout_ms": "0",
@@ -40,6 +41,15 @@ PLAIN = {
     "scouting/multicast/enabled": "false",
     "transport/unicast/open_timeout": "300",
 }
+
+
+def command_in(datagram: bytes) -> tuple[bytes, bytes] | None:
+    """Payload and attachment of a command of ours in a datagram, None if there is none to be read."""
+    size, form = len(Attachment(0, 0, 0).to_bytes()), encode(STOP)
+    at = datagram.find(MAGIC)
+    begin = datagram.find(form[:CDR_HEADER], at + size)
+    payload = datagram[begin : begin + len(form)]
+    return (payload, datagram[at : at + size]) if min(at, begin) >= 0 and len(payload) == len(form) else None
 
 
 class Intruder:
@@ -69,6 +79,15 @@ class Intruder:
         """
         numbers = count(self._hear().seq + AHEAD)
         self._repeat(lambda: self._say(CMD_VEL, self._bus, told := self._hear(), next(numbers), told.stamp_s + ahead_s))
+
+    def repeat(self, datagrams: Sequence[bytes]) -> int:
+        """Say again the commands that are in these, the last again and again, at once and later; returns how many."""
+        said = [found for data in datagrams if (found := command_in(data)) is not None]
+        last = said[-1:] * TIMES
+        for payload, attachment in [*last, *said, *last]:
+            self._bus.put_raw(CMD_VEL, payload, attachment)
+            time.sleep(PAUSE_S)
+        return len(said)
 
     def take_lease(self) -> None:
         """Become the commander, and stand."""
