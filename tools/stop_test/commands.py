@@ -27,7 +27,7 @@ class Commands:
     def start(self, role: str, module: str, words: list[str], certificate: str, noted: str | None) -> list[str]:
         """Command that starts a module in a role. A commander shows a certificate; `noted` notes what it sends."""
         options = [] if noted is None else ["--note", str(self._journal), noted]
-        if self._mutant is not None and self._mutant.where == role:
+        if self._mutant is not None and role in self._mutant.where:
             options += ["--mutant", self._mutant.name]
         if self._setup.clocks:
             options.append("--shifted")

@@ -24,12 +24,12 @@ class MutantError(LiraError):
 
 @dataclass(frozen=True, slots=True)
 class Mutant:
-    """One way to break the product, in the process of the "robot" or of the "policy". `rows` have to fail by it."""
+    """One way to break the product, in the processes of the "robot", "policy" or both. `rows` have to fail by it."""
 
     name: str
     break_: Callable[[], None]
     rows: tuple[str, ...]
-    where: str = "robot"
+    where: tuple[str, ...] = ("robot",)
 
 
 def break_product(name: str) -> None:
@@ -212,7 +212,8 @@ def poll_for_ever() -> None:
 
 def tell_epochs() -> None:
     """Tell everybody the very number by which a commander's session is known."""
-    swap(import_module("lira.hal.safety.governor"), "session_of", lambda epoch: epoch)
+    for module in ("lira.hal.safety.governor", "lira.hal.client.realtime"):
+        swap(import_module(module), "session_of", lambda epoch: epoch)
 
 
 def trust_names() -> None:
@@ -268,14 +269,14 @@ MUTANTS = (
     Mutant("late commands are taken", without_objection("late", "out of order"), ("stamps an hour behind",)),
     Mutant("commands of three seconds ahead are obeyed", constant("lira.hal.safety.governor", "AHEAD_S", 3.0),
            ("stamps half a second ahead",)),
-    Mutant("the client's clock runs ahead", run_ahead, ("link delayed more and more",), where="policy"),
+    Mutant("the client's clock runs ahead", run_ahead, ("link delayed more and more",), where=("policy",)),
     Mutant("the time-out is two seconds", wait_longer, ("commander frozen (SIGSTOP)", "black-out of 1 s")),
     Mutant("the watchdog sleeps", sleep_on_watch, ("commander frozen (SIGSTOP)", "black-out of 1 s")),
     Mutant("a hand that falls silent lets go", let_policy_take_over, ("hand's bridge killed (kill -9)",)),
     Mutant("what is not a number is obeyed", obey_nonsense, ("commands of nan",)),
     Mutant("the protective field sees nothing", see_through, ("lidar freezes, and the commander drives on",)),
     Mutant("a loop that hangs is kept alive", constant("lira.hal.client.realtime", "DECISION_S", FOREVER_S),
-           ("commander's loop hangs",), where="policy"),
+           ("commander's loop hangs",), where=("policy",)),
     Mutant("the base's driver repeats for ever", never_time_out_in_the_base, ("robot's governor hangs",)),
     Mutant("the guard never strikes", freeze_the_guard, ("robot's process frozen (SIGSTOP)",)),
     Mutant("an idle hand arms", arm_by_an_idle_hand,
@@ -285,7 +286,7 @@ MUTANTS = (
     Mutant("a lost device is not missed", never_miss_a_device, ("board reset, up after 1.1 s",)),
     Mutant("a device that is back arms", rewrite(("lost", "found", "armed")), ("board reset, up after 1.1 s",)),
     Mutant("a poll has no end", poll_for_ever, ("flood of commands",)),
-    Mutant("a commander's session is no secret", tell_epochs, ("lease copied",)),
+    Mutant("a commander's session is no secret", tell_epochs, ("lease copied",), where=("robot", "policy")),
     Mutant("a name is what its sender says", trust_names, ("put in the commander's name with another's certificate",)),
     Mutant("a viewer may do all", promote_viewers, ("emergency stop released by a viewer",)),
     Mutant("links outlive their certificates", keep_expired_links, ("certificate runs out",)),
