@@ -113,15 +113,15 @@ class Ros2Robot:
 
     def drive(self, command: Command) -> Applied:
         """Send a velocity, at once if it is new, else at 20 Hz; zero if it was decided too long ago by now."""
-        twist = command.twist
+        twist, reason = command.twist, Reason.OK
         with self._lock:
             now_s = self._now()  # not before: whoever waited for the lock would take an old command for a new one
             if now_s - command.stamp_s > self._profile.control.robot_timeout_s:
-                twist = STOP
+                twist, reason = STOP, Reason.STALE
             due = twist != self._sent or time.monotonic() - self._sent_s >= SEND_S
             if due:
                 self._send(twist, now_s)
-        return Applied(twist, now_s, command.source, Reason.OK, (), command.answers, now_s - command.stamp_s)
+        return Applied(twist, now_s, command.source, reason, (), command.answers, now_s - command.stamp_s)
 
     def device_health(self) -> DeviceHealth:
         """Which of scan and picture are silent now, and how often either was."""

@@ -146,7 +146,7 @@ def test_what_was_decided_too_long_ago_by_the_time_it_is_sent_is_zero():
             hung.start()
             time.sleep(PROFILE.control.robot_timeout_s + 0.1)
         hung.join()
-        assert came[0].twist == STOP
+        assert (came[0].twist, came[0].reason) == (STOP, Reason.STALE)
 
 
 def test_other_names_are_used_and_mistaken_ones_refused(capsys):
