@@ -171,7 +171,7 @@ class Core2:
                 begun = True
                 due_s = looped_s = time.monotonic()
             elif now_s >= due_s or (self._news.is_set() and now_s >= self._sent_s + SPACE_S):
-                self._tell(line, now_s, silent=state is State.SILENT)
+                now_s = self._tell(line, silent=state is State.SILENT)
                 due_s = now_s + SEND_S
                 if now_s < self._until_s:  # zero is sent when it is due, not with the next repetition
                     due_s = min(due_s, self._until_s)
@@ -230,14 +230,15 @@ class Core2:
             self._guard.close()
             self._guard = None
 
-    def _tell(self, line: Line, now_s: float, *, silent: bool) -> None:
-        """Send what is wanted now; zero to a board that is silent."""
+    def _tell(self, line: Line, *, silent: bool) -> float:
+        """Send what is wanted now; zero to a board that is silent. Returns when that was."""
         self._news.clear()
         assert self._guard is not None
         if self._guard.tell():
             self.losses += 1
-            self._held_until_s = now_s + HELD_S
+            self._held_until_s = time.monotonic() + HELD_S
         with self._lock:
+            now_s = time.monotonic()  # not before: whoever waited for the lock would take an old command for a new one
             off, braked = self._motors_off, now_s >= self._power_until_s
             held = silent or off or now_s < self._held_until_s
             twist = self._twist if now_s < self._until_s and not held else STOP
@@ -250,6 +251,7 @@ class Core2:
         if not silent and self._motors_told is not off and (braked or not off):
             self._motors_told = off
             self._board.configure("EMOT", "0" if off else "1")
+        return now_s
 
     def _frame_of(self, twist: Twist) -> bytes:
         assert self._board.cmd_vel is not None

@@ -107,13 +107,16 @@ class Ros2Robot:
         return observation_of(self._seq, self.now(), self._newest)
 
     def drive(self, command: Command) -> Applied:
-        """Send a velocity, at once if it is new, else at 20 Hz."""
-        twist, now_s = command.twist, self.now()
+        """Send a velocity, at once if it is new, else at 20 Hz; zero if it was decided too long ago by now."""
+        twist, reason = command.twist, Reason.OK
         with self._lock:
+            now_s = self._now()  # not before: whoever waited for the lock would take an old command for a new one
+            if now_s - command.stamp_s > self._profile.control.robot_timeout_s:
+                twist, reason = STOP, Reason.STALE
             due = twist != self._sent or time.monotonic() - self._sent_s >= SEND_S
             if due:
                 self._send(twist, now_s)
-        return Applied(twist, now_s, command.source, Reason.OK, (), command.answers, now_s - command.stamp_s)
+        return Applied(twist, now_s, command.source, reason, (), command.answers, now_s - command.stamp_s)
 
     def device_health(self) -> DeviceHealth:
         """Which of scan and picture are silent now, and how often either was."""
@@ -123,7 +126,7 @@ class Ros2Robot:
     def now(self) -> float:
         """Seconds on the robot's ROS clock, late by the shortest way of a message; 0 before there was any."""
         with self._lock:
-            return self._clock.now(time.monotonic()) if self._clock.known else 0.0
+            return self._now()
 
     def wait(self, until_s: float) -> None:
         """Sleep."""
@@ -139,13 +142,16 @@ class Ros2Robot:
         with self._lock:
             for _ in range(FAREWELL):
                 try:
-                    self._send(STOP, self._clock.now(time.monotonic()) if self._clock.known else 0.0)
+                    self._send(STOP, self._now())
                 except BusError:
                     return
 
     def troubles(self) -> dict[str, str]:
         """What is missing, each with its remedy."""
         return {name: f"'{self._interface.topic(name).key}' is silent. {BRIDGE}" for name in self._silent()}
+
+    def _now(self) -> float:
+        return self._clock.now(time.monotonic()) if self._clock.known else 0.0
 
     def _send(self, twist: Twist, now_s: float) -> None:
         self._sent, self._sent_s = twist, time.monotonic()

@@ -73,6 +73,18 @@ def test_the_age_of_a_command_counts_from_when_it_was_decided(tmp_path):
         assert len(bench.twists) == 3
 
 
+def test_a_driver_that_hung_on_its_lock_sends_nothing_that_is_old_by_then(tmp_path):
+    with Bench(tmp_path / "base") as bench:
+        bench.keep(Twist(0.1, 0.0), 0.5)
+        assert bench.twists[-1] == Twist(0.1, 0.0)
+        with bench.base._lock:
+            wait_for(lambda: bench.twists[-1] == STOP)  # the guard strikes
+            time.sleep(0.3)
+            seen = len(bench.twists)
+        time.sleep(0.3)
+        assert bench.twists[seen:] == []
+
+
 @pytest.mark.parametrize("baud", [525000, 500000, 460800])
 def test_it_finds_the_speed_and_learns_the_topics(tmp_path, baud):
     with Bench(tmp_path / "base", Firmware(baud=baud, boot_s=0.1)) as bench:

@@ -4,7 +4,7 @@ import math
 import re
 import threading
 import time
-from contextlib import contextmanager
+from contextlib import closing, contextmanager
 
 import numpy as np
 import pytest
@@ -132,6 +132,21 @@ def test_commands_go_on_at_20_hz_and_end_when_the_client_does():
             time.sleep(0.02)
         assert 15 <= len(robot.commands) - before <= 60
         wait_for(lambda: robot.commands[-1][1] == twist_cdr(0.0, 0.0), 1.5)  # a decision is kept alive for 0.5 s
+
+
+def test_what_was_decided_too_long_ago_by_the_time_it_is_sent_is_zero():
+    with closing(Peer(port := free_port())), closing(Bus("far", connect=f"127.0.0.1:{port}", prefix="")) as bus:
+        robot = Ros2Robot(PROFILE, bus, Interface())
+        robot.open()
+        assert robot.drive(Command(GO, robot.now())).twist == GO
+        came = []
+        decided_s = robot.now()
+        with robot._lock:
+            hung = threading.Thread(target=lambda: came.append(robot.drive(Command(GO, decided_s))))
+            hung.start()
+            time.sleep(PROFILE.control.robot_timeout_s + 0.1)
+        hung.join()
+        assert (came[0].twist, came[0].reason) == (STOP, Reason.STALE)
 
 
 def test_other_names_are_used_and_mistaken_ones_refused(capsys):

@@ -4,6 +4,8 @@ import contextlib
 import json
 import math
 import socket
+import subprocess
+import sys
 import threading
 import time
 from dataclasses import replace
@@ -19,8 +21,8 @@ from lira.tools.stop_test.cull import cull, judge_mutant, rows_of
 from lira.tools.stop_test.journal import Heard, Journal, JournalReader, JournalWriter, Said, Sent, Truth, Wheels
 from lira.tools.stop_test.matrix import Matrix, missing
 from lira.tools.stop_test.mutants import MUTANTS, MutantError, break_product, swap
+from lira.tools.stop_test.parts.sender import Pen
 from lira.tools.stop_test.rows import ROWS
-from lira.tools.stop_test.sender import Pen
 from lira.tools.stop_test.setups import clock_library
 from lira.tools.stop_test.verdict import Bounds, Rules, judge, summarize
 
@@ -313,6 +315,12 @@ def test_a_mutant_is_caught_by_rows_that_fail_because_of_it_and_by_nothing_else(
     assert not judge_mutant(mutant, {"a": "", "b": "failed"}, {"a": "failed", "b": "failed"})["caught"]
 
 
+def test_every_mutant_finds_what_it_breaks():
+    apply = "from lira.tools.stop_test.mutants import *\nfor one in MUTANTS: break_product(one.name)"
+    done = subprocess.run([sys.executable, "-c", apply], capture_output=True, text=True, timeout=60, check=False)
+    assert done.returncode == 0, done.stderr
+
+
 def test_a_mutant_that_no_longer_applies_is_an_error():
     with pytest.raises(MutantError, match="has no 'gone'"):
         swap(Story, "gone", None)
@@ -416,6 +424,20 @@ def test_it_loses_what_does_not_get_through(echo):
         while datagrams.recv(100):
             came += 1
     assert 2 <= came <= 6
+
+
+def test_who_sits_in_the_link_can_send_again_what_went_to_the_robot(echo):
+    relay, _, datagrams = echo
+    sender = threading.Timer(0.1, lambda: [datagrams.send(one) for one in (b"1", b"2")])
+    sender.start()
+    recorded = relay.record(0.4)
+    sender.join()
+    datagrams.send(b"3")  # nobody records any more
+    assert [datagrams.recv(100) for _ in range(3)] == [b"1", b"2", b"3"]
+    assert [one.data for one in recorded] == [b"1", b"2"]
+    for one in recorded:
+        relay.replay(one)
+    assert [datagrams.recv(100) for _ in range(2)] == [b"1", b"2"]
 
 
 def test_what_is_narrow_takes_one_after_the_other():

@@ -23,8 +23,8 @@ from lira.hal.errors import ConfigError
 from lira.hal.messages import STOP, Episode, Source
 from lira.tools.bench import Row, watcher
 from lira.tools.launch.processes import ChildProcess, free_port, lira_command
-from lira.tools.stop_test import hand
 from lira.tools.stop_test.control import tell
+from lira.tools.stop_test.parts import hand
 
 MINUTES = 30.0
 READY_S = 60.0

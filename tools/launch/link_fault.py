@@ -3,9 +3,10 @@
 Change `faults` at any time, from any thread. While `dark`, datagrams are lost, and streams held and delivered late, as
 TCP does; `delay_s` holds everything back, `copies` sends every datagram more than once, `swap` exchanges neighbours;
 `lost` is the share of datagrams that do not arrive, `narrow_byte_s` all that fits through in a second either way: what
-does not is lost if it is a datagram, and waits if it is of a stream.
+does not is lost if it is a datagram, and waits if it is of a stream. Who sits here can also `record` the datagrams
+that go to the robot, and send them again.
 
-python -m lira.tools.relay PORT TARGET_PORT     the same as a process of its own, which can be killed
+python -m lira.tools.launch.link_fault PORT TARGET_PORT     the same as a process of its own, which can be killed
 """
 
 import asyncio
@@ -14,8 +15,10 @@ import math
 import random
 import sys
 import threading
+import time
 from collections.abc import Callable, Coroutine
 from dataclasses import dataclass
+from functools import partial
 from typing import Any, cast
 
 CHUNK = 65536
@@ -36,6 +39,14 @@ class LinkFaults:
     swap: bool = False
     lost: float = 0.0
     narrow_byte_s: float = math.inf
+
+
+@dataclass(frozen=True, slots=True)
+class Datagram:
+    """One that went to the robot; `send` sends it there again, on the relay's thread."""
+
+    data: bytes
+    send: Callable[[], None]
 
 
 class Narrows:
@@ -66,6 +77,7 @@ class Relay:
         self._ready = threading.Event()
         self._streams: set[asyncio.StreamWriter] = set()
         self._datagrams: list[asyncio.BaseTransport] = []
+        self._recorded: list[Datagram] | None = None
         self._tasks: set[asyncio.Task[None]] = set()
         self._thread = threading.Thread(target=self._run, name="relay", daemon=True)
 
@@ -82,6 +94,22 @@ class Relay:
     def cut(self) -> None:
         """Break every stream that is open."""
         self._loop.call_soon_threadsafe(self._abort)
+
+    def record(self, for_s: float) -> list[Datagram]:
+        """Record what goes to the robot as datagrams, oldest first."""
+        recorded = self._recorded = []
+        time.sleep(for_s)
+        self._recorded = None
+        return recorded
+
+    def replay(self, datagram: Datagram) -> None:
+        """Send one to the robot again."""
+        self._loop.call_soon_threadsafe(datagram.send)
+
+    def note(self, datagram: Datagram) -> None:
+        """Keep one, while recording."""
+        if (recorded := self._recorded) is not None:
+            recorded.append(datagram)
 
     def _abort(self) -> None:
         for stream in self._streams:
@@ -164,6 +192,7 @@ class _Front(asyncio.DatagramProtocol):
             self._relay.start(self._connect(addr, data))
         else:
             self._far[addr].send(data)
+            self._relay.note(Datagram(data, partial(self._far[addr].send, data)))
 
     async def _connect(self, addr: tuple[str, int], first: bytes) -> None:
         loop = asyncio.get_running_loop()

@@ -12,13 +12,14 @@ from lira.hal.bus.services import press_estop, release_estop
 from lira.hal.errors import LiraError
 from lira.tools.launch.link_fault import LinkFaults, Relay
 from lira.tools.launch.processes import ChildProcess
-from lira.tools.stop_test.intruder import Intruder
+from lira.tools.stop_test.parts.intruder import Intruder
 
 LEASE_GONE_S = 1.2
 HOUR_S = 3600
 CREEP_S, CREEPS = 0.02, 30
 STEP_S = 0.05
-RECORD_S = 1.0
+RECORD_S, REPLAY_S = 1.0, 0.02
+RECORDED, LAST = 10, 5  # some twenty commands are under way in a second
 ENDED_S = 8.0
 
 
@@ -188,7 +189,7 @@ def rival(bench: Bench) -> None:
 
 
 def forge(ahead_s: float) -> Act:
-    """Let somebody command in the commander's name, with stamps of so much ahead of now."""
+    """Let somebody command with a copy of all that the robot tells of its commander, stamped so much ahead of now."""
     return lambda bench: bench.intruder.forge(ahead_s)
 
 
@@ -212,11 +213,35 @@ def release_as(name: str) -> Act:
     return lambda bench: bench.intruder.release_as(name)
 
 
-def replay(bench: Bench) -> None:
-    """Record what the commander says, freeze it, and say all of it again."""
-    bench.intruder.record(RECORD_S)
+def put_in_name(who: str, name: str) -> Act:
+    """Let somebody command in another's name who has a certificate to drive in an own one."""
+    return lambda bench: bench.intruder.put_in_name(who, name)
+
+
+def replay_commands(bench: Bench) -> None:
+    """Freeze the commander, and say again what it said, byte for byte, in another session.
+
+    Commands are passed on to nobody, and keys hide them: this takes somebody in the link of a robot without any.
+    Raises `StopTestError` if too little was recorded.
+    """
+    recorded = bench.relay.record(RECORD_S)
     bench.driver.signal(signal.SIGSTOP)
-    bench.intruder.replay_recorded()
+    _require(bench.intruder.repeat([one.data for one in recorded]), "commands")
+
+
+def replay_datagrams(bench: Bench) -> None:
+    """Freeze the commander, and send again the datagrams of its link. Raises `StopTestError` if there were too few."""
+    recorded = bench.relay.record(RECORD_S)
+    bench.driver.signal(signal.SIGSTOP)
+    for one in [*recorded[-LAST:], *recorded, *recorded[-LAST:]]:
+        bench.relay.replay(one)
+        time.sleep(REPLAY_S)
+    _require(len(recorded), "datagrams")
+
+
+def _require(count: int, what: str) -> None:
+    if count < RECORDED:
+        raise StopTestError(f"only {count} {what} of the commander were recorded", "Does UDP get through?")
 
 
 def wait_expired(bench: Bench) -> None:

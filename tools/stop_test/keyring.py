@@ -1,5 +1,6 @@
 """The keys of a bus under test: whoever drives by them may run out of time, or be revoked."""
 
+import shutil
 import subprocess
 import time
 from datetime import UTC, datetime, timedelta
@@ -14,13 +15,13 @@ from lira.hal.bus.keys import CERTIFICATE, KEY
 from lira.tools.authority import AUTHORITY
 from lira.tools.launch.processes import lira_command
 from lira.tools.stop_test.acts import StopTestError
-from lira.tools.stop_test.setups import BRIEF, GUEST, LEAVER
+from lira.tools.stop_test.setups import BRIEF, GUEST, LEAVER, RIVAL
 
 BRIEF_S, PATIENCE_S = 10.0, 20.0
 
 
 class Keyring:
-    """Bundles for a robot and some peers: a guest may only look, who is brief does not stay, a leaver is shut out.
+    """Bundles for a robot and some peers: a guest only looks, who is brief does not stay, a leaver is shut out.
 
     Raises `StopTestError` if `lira keys` does not do what it should.
     """
@@ -28,13 +29,18 @@ class Keyring:
     def __init__(self, folder: Path) -> None:
         self.folder = folder
         self._expires = datetime.now(UTC)
+        self._revoked: set[str] = set()
         lira_keys("init", str(folder))
         lira_keys("enroll", GUEST, str(folder), "--viewer")
-        for name in (BRIEF, LEAVER):
+        for name in (RIVAL, BRIEF, LEAVER):
             lira_keys("enroll", name, str(folder))
 
     def prepare(self, name: str) -> Path:
-        """Return a bundle that is ready to be used; one that is brief, for a while."""
+        """Return a bundle to be used now: who is brief has a while, who was shut out is let in again."""
+        if name in self._revoked:
+            shutil.rmtree(self.folder / name)
+            lira_keys("enroll", name, str(self.folder))
+            self._revoked.remove(name)
         if name == BRIEF:
             self._expires = shorten(self.folder, name, BRIEF_S)
         return self.folder / name
@@ -46,6 +52,7 @@ class Keyring:
     def revoke(self, name: str) -> None:
         """Shut a name out."""
         lira_keys("revoke", name, str(self.folder))
+        self._revoked.add(name)
 
 
 def lira_keys(*words: str) -> None:

@@ -24,6 +24,7 @@ WATCH_S = 0.4  # after that: it must not move
 BEFORE_SILENCE_S = 0.3
 TICK_S = 0.02  # the watchdog may look this much after the time-out
 LOOK_S = 0.05
+TOLD_S = 0.2  # the wheels of every setup are told at least each 0.1 s
 
 
 class Matrix:
@@ -119,7 +120,7 @@ def _rules(bench: ProcessBench, row: Row, broken_s: float, mended_s: float) -> R
         end_s=mended_s,
         drives=row.drives,
         # Below the governor the wheels keep what they have until somebody tells them otherwise: the budget bounds that.
-        stale_s=row.budget_s if row.setup.drivers else timeout_s + TICK_S,
+        stale_s=row.budget_s if row.setup.world else timeout_s + TICK_S,
         resumes=row.resumes,
         renews=row.renews,
         shut_out_s=float("inf") if row.shut_out_s is None else broken_s + row.shut_out_s,
@@ -148,7 +149,7 @@ def _get_going(bench: ProcessBench, row: Row, phase_s: float) -> int:
         row.first(bench)
         refused = bench.refused(row.refusal) if row.refusal else 0
         time.sleep(phase_s)
-        if bench.is_fast():
+        if bench.is_fast(time.monotonic() - TOLD_S):
             return refused
         bench.renew(fatal=False)
     raise StopTestError("the robot does not keep going", "The machine is too busy: end some programs.")

@@ -24,12 +24,12 @@ class MutantError(LiraError):
 
 @dataclass(frozen=True, slots=True)
 class Mutant:
-    """One way to break the product, in the process of the "robot" or of the "policy". `rows` have to fail by it."""
+    """One way to break the product, in the processes of the "robot", "policy" or both. `rows` have to fail by it."""
 
     name: str
     break_: Callable[[], None]
     rows: tuple[str, ...]
-    where: str = "robot"
+    where: tuple[str, ...] = ("robot",)
 
 
 def break_product(name: str) -> None:
@@ -70,13 +70,13 @@ def rewrite(*changes: tuple[str, str, str]) -> Callable[[], None]:
     """Change the governor's table: in this state, this event leads to that state, and motion is allowed there."""
 
     def break_() -> None:
-        governor = import_module("lira.hal.safety.governor")
-        table = governor.TRANSITIONS
-        keys = {(str(state), str(event)): (state, event) for state, event in table}
+        from lira.hal.safety.arming import TRANSITIONS, State
+
+        keys = {(str(state), str(event)): (state, event) for state, event in TRANSITIONS}
         for state, event, then in changes:
             if (state, event) not in keys:
-                raise MutantError(f"the governor's table has no {event} of {state}", "Write this mutant anew.")
-            table[keys[state, event]] = (governor.State(then), Reason.OK)
+                raise MutantError(f"the table of arming has no {event} of {state}", "Write this mutant anew.")
+            TRANSITIONS[keys[state, event]] = (State(then), Reason.OK)
 
     return break_
 
@@ -107,6 +107,12 @@ def obey_by_arrival() -> None:
 
     old = swap(Governor, "submit", None)
     setattr(Governor, "submit", lambda governor, command, now_s: old(governor, replace(command, stamp_s=now_s), now_s))  # noqa: B010
+
+
+def obey_repeats() -> None:
+    """Take what was said before for something new."""
+    swap(import_module("lira.hal.server.command_reader").Order, "is_new", lambda *_: True)
+    obey_by_arrival()
 
 
 def wait_longer() -> None:
@@ -179,11 +185,12 @@ def run_ahead() -> None:
 
 def arm_by_an_idle_hand() -> None:
     """Take the zero of a hand that has let go for a wish to drive."""
+    from lira.hal.safety.arming import Event
     from lira.hal.safety.governor import Governor
 
     def arm(_: None, governor: Any, command: Any, *__: Any) -> None:
         if command.source is Source.TELEOP and command.released:
-            governor._fire(import_module("lira.hal.safety.governor").Event.NEUTRAL)
+            governor._fire(Event.NEUTRAL)
 
     after(Governor, "_accept", arm)
 
@@ -201,6 +208,26 @@ def poll_for_ever() -> None:
     old = swap(bus.Bus, "reader", None)
     bus.Bus.reader = lambda self, topic, *_: old(self, replace(topic, max_bytes=1 << 30), 1 << 15)
     swap(import_module("lira.hal.bus.zenoh_session"), "_size_limits", lambda *_: [])
+
+
+def tell_epochs() -> None:
+    """Tell everybody the very number by which a commander's session is known."""
+    for module in ("lira.hal.safety.governor", "lira.hal.client.realtime"):
+        swap(import_module(module), "session_of", lambda epoch: epoch)
+
+
+def trust_names() -> None:
+    """Let every operator command in whatever name it likes."""
+
+    def widen(access: dict[str, Any], robot: str, *_: Any) -> dict[str, Any]:
+        own = [rule for rule in access["rules"] if rule["id"].startswith("drive as")]
+        if not own:
+            raise MutantError("nobody on the access list drives in an own name", "Write this mutant anew.")
+        for rule in own:
+            rule["key_exprs"] = [f"{robot}/cmd_vel/by/*"]
+        return access
+
+    after(import_module("lira.hal.bus.zenoh_session"), "access_list", widen)
 
 
 def promote_viewers() -> None:
@@ -238,17 +265,18 @@ MUTANTS = (
     ),
     Mutant("releasing the emergency stop arms", rewrite(("emergency", "released", "armed")), ("emergency stop",)),
     Mutant("age counts from arrival", obey_by_arrival, ("link delayed more and more",)),
+    Mutant("a repeat is obeyed", obey_repeats, ("commands recorded and replayed",)),
     Mutant("late commands are taken", without_objection("late", "out of order"), ("stamps an hour behind",)),
     Mutant("commands of three seconds ahead are obeyed", constant("lira.hal.safety.governor", "AHEAD_S", 3.0),
            ("stamps half a second ahead",)),
-    Mutant("the client's clock runs ahead", run_ahead, ("link delayed more and more",), where="policy"),
+    Mutant("the client's clock runs ahead", run_ahead, ("link delayed more and more",), where=("policy",)),
     Mutant("the time-out is two seconds", wait_longer, ("commander frozen (SIGSTOP)", "black-out of 1 s")),
     Mutant("the watchdog sleeps", sleep_on_watch, ("commander frozen (SIGSTOP)", "black-out of 1 s")),
     Mutant("a hand that falls silent lets go", let_policy_take_over, ("hand's bridge killed (kill -9)",)),
     Mutant("what is not a number is obeyed", obey_nonsense, ("commands of nan",)),
     Mutant("the protective field sees nothing", see_through, ("lidar freezes, and the commander drives on",)),
     Mutant("a loop that hangs is kept alive", constant("lira.hal.client.realtime", "DECISION_S", FOREVER_S),
-           ("commander's loop hangs",), where="policy"),
+           ("commander's loop hangs",), where=("policy",)),
     Mutant("the base's driver repeats for ever", never_time_out_in_the_base, ("robot's governor hangs",)),
     Mutant("the guard never strikes", freeze_the_guard, ("robot's process frozen (SIGSTOP)",)),
     Mutant("an idle hand arms", arm_by_an_idle_hand,
@@ -258,6 +286,8 @@ MUTANTS = (
     Mutant("a lost device is not missed", never_miss_a_device, ("board reset, up after 1.1 s",)),
     Mutant("a device that is back arms", rewrite(("lost", "found", "armed")), ("board reset, up after 1.1 s",)),
     Mutant("a poll has no end", poll_for_ever, ("flood of commands",)),
+    Mutant("a commander's session is no secret", tell_epochs, ("lease copied",), where=("robot", "policy")),
+    Mutant("a name is what its sender says", trust_names, ("put in the commander's name with another's certificate",)),
     Mutant("a viewer may do all", promote_viewers, ("emergency stop released by a viewer",)),
     Mutant("links outlive their certificates", keep_expired_links, ("certificate runs out",)),
     Mutant("who is revoked stays", never_read_keys_again, ("name revoked",)),

@@ -34,13 +34,27 @@ from lira.tools.stop_test.setups import (
     LEARNER,
     LEAVER,
     LINK,
+    RIVAL,
+    ROS2,
     TWIN,
     Setup,
 )
-from lira.tools.stop_test.verdict import BASE, BOARD, DRIVER, ESTOP, FAREWELL, FIELD, GUARD, REFUSAL, WATCHDOG
+from lira.tools.stop_test.verdict import (
+    BASE,
+    BOARD,
+    CONTROLLER,
+    DRIVER,
+    ESTOP,
+    FAREWELL,
+    FIELD,
+    GUARD,
+    REFUSAL,
+    WATCHDOG,
+)
 
 BUDGET_S = 0.35
 WATCHED_S = 0.7  # a device that fell silent has to be found out first
+CONTROLLER_S = 0.6  # a ROS 2 robot's own time-out, 0.5 s as usual: nothing of ours runs there
 DRIVERS_S = 0.45  # below the governor: the base driver waits 0.30 s, the guard 0.20 s after the last byte it heard
 FIRMWARE_S = 1.2  # nobody is left but the board's own watchdog, 1.0 s after the last command it had
 
@@ -89,7 +103,6 @@ SEES = (DRIVER, FIELD)  # whoever looks at the sensor first: the driver, or the 
 DRIVE, INSIST, WELL = driver_does("drive"), driver_does("insist"), robot_does("")
 RANDOM = bytes(range(7, 255, 6))  # no longer than a command
 HAND, LIRA = frozenset({"hand"}), frozenset({"fusion"})
-FORGED = ("another commander", "old epoch", "out of order", "late")
 NO_DEVICE = (WATCHDOG, BASE, FIELD, "neutral first")
 SENSOR_S = 0.7  # a sensor is old after 0.3 s for the driver, after 0.5 s for the field; then a tick
 
@@ -166,9 +179,10 @@ ROWS = (
     # Others who command.
     Row("second commander", acts.rival, silence=True, refusal=("another commander",), quick=True),
     Row("commander with an old epoch", acts.lose_the_lease, THAW, hold_s=1.5, refusal=("old epoch",), fatal=True),
-    Row("commands forged with an old time", acts.forge(-1.0), silence=True, refusal=FORGED),
-    Row("commands recorded and replayed", acts.replay, THAW, refusal=("late", "out of order", *FORGED)),
-    Row("lease copied", acts.forge(0.0), silence=True, refusal=FORGED, quick=True),
+    Row("commands forged with an old time", acts.forge(-1.0), silence=True, refusal=("late",)),
+    Row("commands recorded and replayed", acts.replay_commands, THAW, refusal=("out of order",)),
+    Row("datagrams recorded and replayed", acts.replay_datagrams, THAW, trials=1),
+    Row("lease copied", acts.forge(0.0), silence=True, refusal=("another commander",), quick=True),
     Row("emergency stop beside an idle ROS joystick", acts.press,
         one_by_one(acts.release, pause(1.0), acts.rest), first=one_by_one(acts.idle_joystick, INSIST),
         stopped_by=(ESTOP,), within_s=BUDGET_S, quick=True),
@@ -219,10 +233,9 @@ ROWS = (
         trials=1),
     Row("board heard no more", one_by_one(INSIST, world_does("board mute")), REPAIRED, hold_s=2.5,
         stopped_by=NO_DEVICE, budget_s=WATCHED_S, within_s=WATCHED_S, below=BASE, setup=DRIVERS),
-    # The board does not say that it hears nothing, so nobody here can know when it hears again: the commander leaves.
-    Row("board hears no more", one_by_one(INSIST, world_does("board deaf")),
-        one_by_one(driver_does("leave"), pause(0.5), REPAIRED), hold_s=1.5,
-        stopped_by=(BOARD,), budget_s=FIRMWARE_S, within_s=FIRMWARE_S, below=BOARD, setup=DRIVERS),
+    # Only the firmware's watchdog can stop such a board; meanwhile the driver has found out, and holds whoever insists.
+    Row("board hears no more", one_by_one(INSIST, world_does("board deaf")), REPAIRED, hold_s=1.5,
+        stopped_by=(BOARD, *NO_DEVICE), budget_s=FIRMWARE_S, within_s=FIRMWARE_S, below=BOARD, setup=DRIVERS),
     Row("board lost for less than a tick", one_by_one(INSIST, world_does("board mute until asked")), hold_s=3.0,
         stopped_by=NO_DEVICE, budget_s=WATCHED_S, within_s=WATCHED_S, below=BASE, setup=DRIVERS, trials=1),
     Row("lidar mute, then something in the way, and away", one_by_one(INSIST, world_does("lidar mute")),
@@ -232,6 +245,13 @@ ROWS = (
         one_by_one(REPAIRED, OBSTACLE), hold_s=1.0, stopped_by=NO_DEVICE, within_s=WATCHED_S, setup=DRIVERS,
         trials=1),
     flooded("samples of 1 MB", DRIVERS),
+    # A robot that runs ROS 2.
+    Row("commander killed (kill -9) on a robot that runs ROS 2", KILL, setup=ROS2, trials=1),
+    flooded("samples of 1 MB", ROS2),
+    Row("lira ros2 killed (kill -9)", acts.robot_signal(signal.SIGKILL), acts.restart_robot,
+        stopped_by=(CONTROLLER,), budget_s=CONTROLLER_S, below=CONTROLLER, setup=ROS2, trials=1),
+    Row("lira ros2 frozen (SIGSTOP)", ROBOT_FREEZE, ROBOT_THAW, hold_s=1.6, stopped_by=(CONTROLLER,),
+        budget_s=CONTROLLER_S, below=CONTROLLER, setup=ROS2),
     # The time of day.
     clock_set("robot", HOUR_S, "ahead"),
     clock_set("robot", -HOUR_S, "behind"),
@@ -240,6 +260,11 @@ ROWS = (
     # Keys.
     Row("put without a certificate", acts.put_plainly, silence=True, refusal=("links",), setup=KEYED),
     Row("put with a viewer's certificate", acts.put_as(GUEST), silence=True,
+        refusal=("messages",), setup=KEYED),
+    Row("datagrams recorded and replayed where there are keys", acts.replay_datagrams, THAW, setup=KEYED, trials=1),
+    Row("put with another operator's certificate", acts.put_as(RIVAL), silence=True,
+        refusal=("another commander",), setup=KEYED),
+    Row("put in the commander's name with another's certificate", acts.put_in_name(RIVAL, LAPTOP), silence=True,
         refusal=("messages",), setup=KEYED),
     Row("emergency stop released by a viewer", one_by_one(acts.press, driver_does("waver")), acts.release_as(GUEST),
         stopped_by=(ESTOP,), within_s=BUDGET_S, setup=KEYED, fatal=True),

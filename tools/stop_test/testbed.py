@@ -7,12 +7,12 @@ import time
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
+from types import ModuleType
 from typing import TYPE_CHECKING
 
 import msgspec
 
 from lira.hal.bus.bus import Bus
-from lira.hal.bus.keys import VARIABLE as KEYS_VARIABLE
 from lira.hal.bus.keys import load_keys
 from lira.hal.bus.services import release_estop
 from lira.hal.bus.topics import APPLIED, DIAGNOSTICS, INFO, RESET
@@ -21,13 +21,14 @@ from lira.hal.messages import Episode, Source
 from lira.hal.profile import RobotProfile, load_profile
 from lira.tools.launch import link_fault as relay
 from lira.tools.launch.processes import ChildProcess, ProcessError, free_port
-from lira.tools.stop_test import driver, hand, launch, pulse, robot, world
 from lira.tools.stop_test.acts import StopTestError
+from lira.tools.stop_test.commands import HAND, POLICY, ROBOT, WORLD, Commands
 from lira.tools.stop_test.control import ASK_TIME, TIME, tell
-from lira.tools.stop_test.intruder import Intruder
 from lira.tools.stop_test.journal import Journal, JournalReader
 from lira.tools.stop_test.mutants import Mutant
-from lira.tools.stop_test.setups import BRIEF, LAPTOP, Setup, clock_library
+from lira.tools.stop_test.parts import driver, hand, pulse, robot, ros2_world, world
+from lira.tools.stop_test.parts.intruder import Intruder
+from lira.tools.stop_test.setups import BRIEF, LAPTOP, Setup
 
 if TYPE_CHECKING:
     from lira.tools.stop_test.keyring import Keyring
@@ -43,8 +44,8 @@ NEAR_S = 60.0
 ANSWER_S = 5.0
 RELEASE_S = 1.0
 POLL_S = 0.02
-POLICY, HAND, ROBOT, WORLD, LINK, PULSE = "policy", "hand", "robot", "world", "link", "pulse"
-READY = {POLICY: driver.READY, HAND: hand.READY, ROBOT: robot.READY, WORLD: world.READY}
+LINK, PULSE = "link", "pulse"
+TOLD = (POLICY, HAND, ROBOT, WORLD)  # who takes control messages
 NOTED = {HAND: "hand"}  # a driver notes by itself what it sends
 
 
@@ -52,20 +53,23 @@ class ProcessBench:
     """Implements `acts.Bench`. With a `mutant` the process that it belongs to is broken by it."""
 
     def __init__(self, stack: ExitStack, folder: Path, profile: str, setup: Setup, mutant: Mutant | None) -> None:
-        self._stack, self._folder, self._setup, self._mutant = stack, folder, setup, mutant
+        self._stack, self._folder, self._setup = stack, folder, setup
         self._profile_name = setup.profile or profile
         self.profile: RobotProfile = load_profile(self._profile_name)
         self.name, self._port, self._front = f"stop_{free_port()}", free_port(), free_port()
         self._journal = JournalReader(folder / "journal")
-        self._ports = {role: free_port() for role in READY}
+        self._ports = {role: free_port() for role in TOLD}
         self._running: dict[str, ChildProcess] = {}
         self._tested, self._runs, self._certificate = POLICY, 0, LAPTOP
         self._keyring = _make_keys(folder / "keys") if setup.keys else None
+        self._commands = Commands(folder, self._journal.folder, setup, self._keyring, mutant)
         command = [sys.executable, "-m", pulse.__name__, str(self._journal.folder)]
         self._run(PULSE, command, pulse.READY)
-        if setup.drivers:
-            words = [self._profile_name, str(self._journal.folder), str(self._ports[WORLD]), str(folder)]
-            self._run_module(WORLD, world.__name__, words)
+        self._bridge = free_port()
+        if setup.world:
+            words = [self._profile_name, str(self._journal.folder), str(self._ports[WORLD])]
+            words.append(str(self._bridge if setup.ros2 else folder))
+            self._run_module(WORLD, ros2_world if setup.ros2 else world, words)
         self.restart_robot()
         behind = self._port
         if setup.link:
@@ -119,7 +123,9 @@ class ProcessBench:
         words += [str(self._journal.folder), str(self._ports[ROBOT])]
         if self._setup.drivers:
             words += [str(self._folder), self._running[WORLD].output().partition(world.READY)[2].split()[0]]
-        self._run_module(ROBOT, robot.__name__, words)
+        elif self._setup.ros2:
+            words.append(str(self._bridge))
+        self._run_module(ROBOT, robot, words)
 
     def restart_link(self) -> None:
         """Start the process in the link."""
@@ -156,7 +162,7 @@ class ProcessBench:
         """Put the robot back to its start and get it going. Raises `StopTestError` if it does not."""
         self._tested = HAND if by_hand else POLICY
         self._journal.skip()
-        if self._setup.drivers:
+        if self._setup.world:
             tell(self._ports[WORLD], "reset")
             time.sleep(SETTLE_S)
         else:
@@ -223,7 +229,7 @@ class ProcessBench:
 
     def _write_clock(self, who: str, offset_s: int) -> str:
         role = ROBOT if who == "robot" else self._tested
-        self._clock_file(role).write_text(f"{offset_s:+d}", encoding="utf-8")
+        self._commands.clock_file(role).write_text(f"{offset_s:+d}", encoding="utf-8")
         return role
 
     def _start_commander(self, role: str) -> None:
@@ -231,19 +237,19 @@ class ProcessBench:
             self._runs += 1
             fusion = [word.format(run=self.run_folder) for word in self._setup.fusion]
             words = ["fusion", *fusion, "--name", self.name, "--connect", f"127.0.0.1:{self._front}"]
-            self._run(POLICY, self._python(POLICY, "tools", words, "fusion"), self.name)
+            self._run(POLICY, self._commands.start(POLICY, "lira.tools", words, self._certificate, "fusion"), self.name)
             return
         if role not in self._running or self._running[role].status() is not None:
             if role == POLICY:
                 self._run_driver()
             else:
                 words = [self.name, f"127.0.0.1:{self._front}", str(self._ports[HAND])]
-                self._run_module(HAND, hand.__name__, words)
+                self._run_module(HAND, hand, words)
         tell(self._ports[role], "go")
 
     def _run_driver(self) -> None:
         words = [self.name, f"127.0.0.1:{self._front}", str(self._ports[POLICY]), str(self._journal.folder)]
-        self._run_module(POLICY, driver.__name__, words)
+        self._run_module(POLICY, driver, words)
 
     def _wait_until_it_drives(self, role: str) -> None:
         began_s = told_s = time.monotonic()
@@ -264,38 +270,15 @@ class ProcessBench:
         newest = self._applied.newest()
         return Source.NONE if newest is None else newest.message.source
 
-    def _run_module(self, role: str, module: str, words: list[str]) -> None:
-        self._run(role, self._python(role, module, words, NOTED.get(role)), READY[role])
+    def _run_module(self, role: str, module: ModuleType, words: list[str]) -> None:
+        self._run(
+            role, self._commands.start(role, module.__name__, words, self._certificate, NOTED.get(role)), module.READY
+        )
 
     def _run(self, role: str, command: list[str], ready: str) -> None:
         process = self._stack.enter_context(ChildProcess(role, command, self._folder / f"{role}.log"))
         self._running[role] = process
         process.wait_ready(ready, READY_S)
-
-    def _python(self, role: str, module: str, words: list[str], noted: str | None) -> list[str]:
-        """Command that starts a module, with what is peculiar to the setup, the mutant and the journal."""
-        options = [] if noted is None else ["--note", str(self._journal.folder), noted]
-        if self._mutant is not None and self._mutant.where == role:
-            options += ["--mutant", self._mutant.name]
-        if self._setup.clocks:
-            options.append("--shifted")
-        return [*self._environment(role), sys.executable, "-m", launch.__name__, *options, module, *words]
-
-    def _environment(self, role: str) -> list[str]:
-        """Words that start a command with what is peculiar to the setup."""
-        settings = {}
-        if self._keyring is not None:
-            settings[KEYS_VARIABLE] = str(self._keyring.prepare(ROBOT if role == ROBOT else self._certificate))
-        if self._setup.clocks:
-            self._clock_file(role).write_text("+0", encoding="utf-8")
-            settings["LD_PRELOAD"] = str(clock_library())
-            settings["FAKETIME_TIMESTAMP_FILE"] = str(self._clock_file(role))
-            settings["FAKETIME_CACHE_DURATION"] = "1"
-            settings["FAKETIME_DONT_FAKE_MONOTONIC"] = "1"
-        return ["env", *(f"{name}={value}" for name, value in settings.items())] if settings else []
-
-    def _clock_file(self, role: str) -> Path:
-        return self._folder / f"{role}.clock"
 
 
 def _make_keys(folder: Path) -> "Keyring":

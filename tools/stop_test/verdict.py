@@ -1,7 +1,7 @@
 """What a trial's journal says: how soon it stood, how far it went, what it obeyed, and whether it moved unasked. Pure.
 
-Whose motion the wheels had, and how old it was, is found by the mark on each command (`sender.py`) in the senders' own
-logs. Motion that is in nobody's log was asked by nobody.
+Whose motion the wheels had, and how old it was, is found by the mark on each command (`parts/sender.py`) in the
+senders' own logs. Motion that is in nobody's log was asked by nobody.
 """
 
 import math
@@ -21,11 +21,9 @@ REACH_S = 0.15  # between the governor's word and the wheels, at most
 # What may stop a robot, by the governor's reason.
 WATCHDOG, REFUSAL, ESTOP, FIELD = "watchdog", "refusal", "e-stop", "protective field"
 DRIVER, FAREWELL, HELD = "zero commanded", "commander left", "neutral first"
-GUARD, BASE, BOARD = (
-    "base's guard process",
-    "base driver's watchdog",
-    "base board",
-)  # the governor knows nothing of these
+# The governor knows nothing of these.
+GUARD, BASE, BOARD = "base's guard process", "base driver's watchdog", "base board"
+CONTROLLER = "robot's own controller"
 STOPPERS: dict[Reason, str] = {
     Reason.STALE: WATCHDOG,
     Reason.REFUSED: REFUSAL,

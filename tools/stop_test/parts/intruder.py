@@ -6,23 +6,23 @@ import subprocess
 import sys
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from itertools import count
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import zenoh
 
-from lira.hal.bus.attachment import Attachment
-from lira.hal.bus.bus import Bus, Received
+from lira.hal.bus.attachment import MAGIC, Attachment
+from lira.hal.bus.bus import Bus, Publisher
 from lira.hal.bus.keys import load_keys
 from lira.hal.bus.services import look_at_estop, release_estop
-from lira.hal.bus.topics import APPLIED, CMD_VEL, TELEOP
+from lira.hal.bus.topics import APPLIED, CMD_VEL, TELEOP, Topic, named
 from lira.hal.errors import BusError
 from lira.hal.messages import STOP, Applied, Twist
 from lira.hal.messages.codec import encode
-from lira.tools.stop_test import flood
-from lira.tools.stop_test.sender import Pen
+from lira.tools.stop_test.parts import flood
+from lira.tools.stop_test.parts.sender import Pen
 
 if TYPE_CHECKING:
     from lira.tools.stop_test.keyring import Keyring
@@ -32,9 +32,8 @@ PAUSE_S = 0.02
 IDLE_S = 0.05
 BACK = Twist(-0.1, 0.0)
 WAIT_S, RELEASE_S = 5.0, 0.5
-EAVESDROP_S = 0.3
 AHEAD = 40  # messages: numbers that the commander will come to within a few seconds
-DEPTH = 256
+CDR_HEADER = 4  # bytes
 PLAIN = {
     "mode": '"peer"',
     "connect/timeout_ms": "0",
@@ -42,6 +41,15 @@ PLAIN = {
     "scouting/multicast/enabled": "false",
     "transport/unicast/open_timeout": "300",
 }
+
+
+def command_in(datagram: bytes) -> tuple[bytes, bytes] | None:
+    """Payload and attachment of a command of ours in a datagram, None if there is none to be read."""
+    size, form = len(Attachment(0, 0, 0).to_bytes()), encode(STOP)
+    at = datagram.find(MAGIC)
+    begin = datagram.find(form[:CDR_HEADER], at + size)
+    payload = datagram[begin : begin + len(form)]
+    return (payload, datagram[at : at + size]) if min(at, begin) >= 0 and len(payload) == len(form) else None
 
 
 class Intruder:
@@ -53,7 +61,6 @@ class Intruder:
         self._pen, self._thumb = Pen(journal, "intruder"), Pen(journal, "joystick")
         self._publisher = bus.publisher(CMD_VEL)
         self._applied = bus.reader(APPLIED)
-        self._recorded: list[Received[Twist]] = []
         self._ended = threading.Event()
         self._background: list[threading.Thread] = []
         self._floods: list[subprocess.Popen[bytes]] = []
@@ -67,33 +74,20 @@ class Intruder:
         self._repeat(lambda: self._publisher.put(self._pen.mark(BACK), self._hear().stamp_s))
 
     def forge(self, ahead_s: float) -> None:
-        """Command in the commander's name, as whoever listens to it can, with stamps of so much ahead of now."""
-        self.record(EAVESDROP_S)
-        sent = [received.attachment for received in self._recorded if received.attachment is not None]
-        self._recorded = []
-        epoch, seq = (sent[-1].epoch, sent[-1].seq) if sent else (0, 0)
-        numbers = count(seq + AHEAD)
-        self._repeat(lambda: self._say_as(epoch, next(numbers), self._hear().stamp_s + ahead_s))
+        """Command in the commander's place, with a copy of all that the robot tells of it: the session and numbers that
+        it will come to, with stamps of so much ahead of now.
+        """
+        numbers = count(self._hear().seq + AHEAD)
+        self._repeat(lambda: self._say(CMD_VEL, self._bus, told := self._hear(), next(numbers), told.stamp_s + ahead_s))
 
-    def record(self, for_s: float) -> None:
-        """Listen to what the commander says, as whoever is let in as a watcher may."""
-        watch = Bus(self._bus.robot, connect=self._bus.endpoint, watch=True)
-        reader, until_s = watch.reader(CMD_VEL, DEPTH), time.monotonic() + for_s
-        while time.monotonic() < until_s:
-            self._recorded += reader.poll()
+    def repeat(self, datagrams: Sequence[bytes]) -> int:
+        """Say again the commands that are in these, the last again and again, at once and later; returns how many."""
+        said = [found for data in datagrams if (found := command_in(data)) is not None]
+        last = said[-1:] * TIMES
+        for payload, attachment in [*last, *said, *last]:
+            self._bus.put_raw(CMD_VEL, payload, attachment)
             time.sleep(PAUSE_S)
-        watch.close()
-
-    def replay_recorded(self) -> None:
-        """Say all of it again, and the last word again and again, at once and later."""
-        recorded, self._recorded = self._recorded, []
-        if not recorded:
-            raise TimeoutError("nothing was recorded of what the commander says")
-        last = recorded[-1:] * TIMES
-        for received in [*last, *recorded, *last]:
-            attached = None if received.attachment is None else received.attachment.to_bytes()
-            self._bus.put_raw(CMD_VEL, encode(received.message), attached)
-            time.sleep(PAUSE_S)
+        return len(said)
 
     def take_lease(self) -> None:
         """Become the commander, and stand."""
@@ -146,10 +140,18 @@ class Intruder:
     def put_as(self, who: str) -> None:
         """Put with the certificate of another peer."""
         bus = self._session_of(who)
-        publisher, deadline_s = bus.publisher(CMD_VEL), time.monotonic() + WAIT_S
-        while not publisher.matching and time.monotonic() < deadline_s:
-            time.sleep(PAUSE_S)
+        publisher = bus.publisher(CMD_VEL)
+        self._wait_heard(publisher)
         self._repeat(lambda: publisher.put(self._pen.mark(BACK), self._hear().stamp_s))
+        bus.close()
+
+    def put_in_name(self, who: str, name: str) -> None:
+        """Put in somebody's name, with the certificate of another who may drive, and all that the robot tells."""
+        bus = self._session_of(who)
+        self._wait_heard(bus.publisher(CMD_VEL))
+        numbers = count(self._hear().seq + AHEAD)
+        topic = named(CMD_VEL, name)
+        self._repeat(lambda: self._say(topic, bus, told := self._hear(), next(numbers), told.stamp_s))
         bus.close()
 
     def release_as(self, who: str) -> None:
@@ -165,9 +167,18 @@ class Intruder:
         assert self._keyring is not None
         return Bus(self._bus.robot, connect=self._bus.endpoint, keys=load_keys(self._keyring.prepare(who)))
 
-    def _say_as(self, epoch: int, seq: int, stamp_s: float) -> None:
-        attachment = Attachment(epoch, seq, round(max(stamp_s, 0.0) * 1e9))
-        self._bus.put_raw(CMD_VEL, encode(self._pen.mark(BACK)), attachment.to_bytes())
+    def _wait_heard(self, publisher: Publisher[Twist]) -> None:
+        """Wait until the robot listens to it: what is put before goes nowhere, and proves nothing."""
+        deadline_s = time.monotonic() + WAIT_S
+        while not publisher.matching:
+            if time.monotonic() > deadline_s:
+                raise TimeoutError("the robot does not listen to the intruder")
+            time.sleep(PAUSE_S)
+
+    def _say(self, topic: Topic[Twist], bus: Bus, told: Applied, seq: int, stamp_s: float) -> None:
+        """Command as if in the session of which the robot tells."""
+        attachment = Attachment(told.session, seq, round(max(stamp_s, 0.0) * 1e9))
+        bus.put_raw(topic, encode(self._pen.mark(BACK)), attachment.to_bytes())
 
     def _repeat(self, act: Callable[[], None]) -> None:
         for _ in range(TIMES):

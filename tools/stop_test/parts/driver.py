@@ -5,7 +5,7 @@ for motion whatever happens, and never for zero; `waver` asks for motion and zer
 falls silent; `mute` falls silent in motion; `hang` does nothing any more, as a loop that never comes back. Any other
 names a command to send that may not be obeyed (`TWISTS`, `STAMPS_S`).
 
-python -m lira.tools.stop_test.driver NAME HOST:PORT CONTROL_PORT JOURNAL
+python -m lira.tools.stop_test.parts.driver NAME HOST:PORT CONTROL_PORT JOURNAL
 """
 
 import math
@@ -21,7 +21,7 @@ from lira.hal.client.remote import RemoteRobot
 from lira.hal.errors import SensorError
 from lira.hal.messages import HELD, STOP, Applied, Command, Reason, Twist
 from lira.tools.stop_test.control import ASK_TIME, listen, print_time
-from lira.tools.stop_test.sender import Pen, note_commands
+from lira.tools.stop_test.parts.sender import Pen, note_commands
 
 READY = "driving by word"
 FAREWELLS = 3

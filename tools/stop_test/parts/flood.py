@@ -1,6 +1,6 @@
 """A peer that sends as much as fits through, until it is killed. It knows nothing but zenoh, which is fastest.
 
-python -m lira.tools.stop_test.flood HOST:PORT ROBOT KIND
+python -m lira.tools.stop_test.parts.flood HOST:PORT ROBOT KIND
 """
 
 import json

@@ -1,6 +1,6 @@
 """A process that does nothing but sleep, and notes when it was woken late: then this machine was busy, or stood still.
 
-python -m lira.tools.stop_test.pulse JOURNAL
+python -m lira.tools.stop_test.parts.pulse JOURNAL
 """
 
 import sys

@@ -2,7 +2,7 @@
 
 Control messages: `go` grips and pushes the stick as far as it goes; `leave` lets go.
 
-python -m lira.tools.stop_test.hand NAME HOST:PORT CONTROL_PORT
+python -m lira.tools.stop_test.parts.hand NAME HOST:PORT CONTROL_PORT
 """
 
 import sys

@@ -1,6 +1,6 @@
 """Starts a process under test: whose commands are noted, whose time of day may be shifted, which may be a mutant.
 
-python -m lira.tools.stop_test.launch [--note JOURNAL WHO] [--mutant NAME] [--shifted] MODULE WORDS...
+python -m lira.tools.stop_test.parts.launch [--note JOURNAL WHO] [--mutant NAME] [--shifted] MODULE WORDS...
 """
 
 import argparse
@@ -29,7 +29,7 @@ def main() -> None:
     if args.shifted:
         time.sleep = sleep
     if args.note is not None:
-        from lira.tools.stop_test.sender import note_commands
+        from lira.tools.stop_test.parts.sender import note_commands
 
         note_commands(Path(args.note[0]), args.note[1])
     if args.mutant is not None:

@@ -3,14 +3,14 @@
 It goes on whatever happens to the robot's process. Control messages: `reset` puts the robot back to its start; `well`
 mends all; the others are the names in `Devices.break_`.
 
-python -m lira.tools.stop_test.world PROFILE JOURNAL CONTROL_PORT FOLDER
+python -m lira.tools.stop_test.parts.world PROFILE JOURNAL CONTROL_PORT FOLDER
 """
 
 import sys
 import threading
 from collections.abc import Callable
-from dataclasses import replace
 from pathlib import Path
+from queue import SimpleQueue
 from typing import Any
 
 import numpy as np
@@ -23,7 +23,7 @@ from lira.sim_backend.emulators.wired_twin import WiredTwin
 from lira.sim_backend.polyline import Floats
 from lira.tools.stop_test.control import listen
 from lira.tools.stop_test.journal import JournalWriter
-from lira.tools.stop_test.robot import NotedTwin, keep_truth, small_pictures
+from lira.tools.stop_test.parts.robot import NotedTwin, keep_truth, small_pictures
 
 READY = "devices, camera at "
 NEAR_M = 0.15  # in front of the lidar: inside the protective field
@@ -32,11 +32,13 @@ BOARD_RESETS = "board resets "
 
 class Gate:
     """Stands between a device and its line: what is shut off does not get through. `deaf`: it hears nothing; `mute`:
-    nobody hears it. `mute_until_asked`: nor does anybody until the host asks which topics it has.
+    nobody hears it. `mute_until_asked`: nor does anybody until the host asks which topics it has. `soon` takes what is
+    to be done to the device on its own thread.
     """
 
     def __init__(self, unit: Any) -> None:
         self.deaf = self.mute = self.mute_until_asked = False
+        self.soon: SimpleQueue[Callable[[], None]] = SimpleQueue()
         self._receive: Callable[[bytes, float], None] = unit.receive
         self._emit: Callable[[float], bytes] = unit.emit
         unit.receive, unit.emit = self.receive, self.emit
@@ -54,6 +56,8 @@ class Gate:
 
     def emit(self, now_s: float) -> bytes:
         """Return what the host gets."""
+        while not self.soon.empty():
+            self.soon.get()()
         data = self._emit(now_s)
         return b"" if self.mute or self.mute_until_asked else data
 
@@ -103,8 +107,7 @@ class Devices(WiredTwin):
 
     def reset_board(self, boot_s: float) -> None:
         """Press the board's reset button; it is up again after `boot_s`."""
-        self.base.firmware = replace(self.base.firmware, boot_s=boot_s)
-        self.base.reset()
+        self.board.soon.put(lambda: self.base.reset(boot_s))
 
     def _distances(self, theta_rad: Floats) -> Floats:
         distances = super()._distances(theta_rad)

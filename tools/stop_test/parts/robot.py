@@ -1,8 +1,9 @@
 """The robot under test: a HAL server in real time that keeps a journal, on a robot that can be broken by word.
 
-That is a twin, or, with the folder of a world's devices, the physical robot's drivers.
+That is a twin; or, with the folder of a world's devices, the physical robot's drivers; or, with the port of a bridge,
+what `lira ros2` serves.
 
-python -m lira.tools.stop_test.robot NAME HOST:PORT PROFILE JOURNAL CONTROL_PORT [FOLDER CAMERA_URL]
+python -m lira.tools.stop_test.parts.robot NAME HOST:PORT PROFILE JOURNAL CONTROL_PORT [FOLDER CAMERA_URL | PORT]
 """
 
 import signal
@@ -23,6 +24,7 @@ from lira.hal.port import Robot
 from lira.hal.profile import RobotProfile, load_profile
 from lira.hal.safety.governed import GovernedRobot
 from lira.hal.server.server import HalServer, stop_on_signal
+from lira.robot.ros2.robot import Interface, Ros2Robot
 from lira.robot.rosbot import Devices, Rosbot
 from lira.sim_backend.twin import Twin
 from lira.tools.stop_test.control import ASK_TIME, listen, print_time
@@ -97,6 +99,12 @@ class BreakableDrivers(Rosbot):
             self.base._lock.release()
 
 
+class BridgedRobot(Ros2Robot):
+    """A robot that runs ROS 2. Nothing here breaks by a control message."""
+
+    fault = ""
+
+
 class WatchedRobot(GovernedRobot):
     """Notes what arrives and what the governor says. While it `hangs`, so does every thread that needs the governor."""
 
@@ -129,7 +137,12 @@ def small_pictures(profile: RobotProfile) -> RobotProfile:
 def main(name: str, endpoint: str, profile_name: str, journal_folder: str, control_port: str, *devices: str) -> None:
     """Serve until told to stop."""
     profile, journal = small_pictures(load_profile(profile_name)), JournalWriter(Path(journal_folder), "robot")
-    robot = open_drivers(profile, *devices) if devices else BreakableTwin(profile, journal)
+    far = Bus(name, connect=f"127.0.0.1:{devices[0]}", prefix="") if len(devices) == 1 else None
+    robot: BreakableTwin | BreakableDrivers | BridgedRobot
+    if far is not None:
+        robot = BridgedRobot(profile, far, Interface())
+    else:
+        robot = open_drivers(profile, *devices) if devices else BreakableTwin(profile, journal)
     watched = WatchedRobot(robot, journal)
 
     def hear(message: str) -> None:
@@ -156,6 +169,8 @@ def main(name: str, endpoint: str, profile_name: str, journal_folder: str, contr
             HalServer(watched, bus, twin, ready=ready).run(stop)
     finally:
         bus.close()
+        if far is not None:
+            far.close()
 
 
 def open_drivers(profile: RobotProfile, folder: str, camera_url: str) -> BreakableDrivers:

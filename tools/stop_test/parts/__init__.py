@@ -1,0 +1,1 @@
+"""What a trial consists of: the processes under test, and those that look on or mean no good."""
