@@ -1,0 +1,115 @@
+"""Training an expert in process: the same loop, teacher and session as over the bus."""
+
+from contextlib import closing
+from dataclasses import replace
+from pathlib import Path
+
+import msgspec
+import numpy as np
+import torch
+
+from lira.fusion.control import ControlLoop
+from lira.fusion.experts.files import SHIPPED, Sensor, folder_of, seeded
+from lira.fusion.experts.tasks import DEFAULT, TASKS
+from lira.fusion.learning.learner import Learner
+from lira.fusion.learning.novice import LearningSettings, NetworkNovice
+from lira.fusion.learning.trainer import InlineTrainer
+from lira.fusion.log.recorder import Journal
+from lira.fusion.log.run_log import Record
+from lira.fusion.methods.base import Alone
+from lira.fusion.methods.hg_dagger import HgDagger
+from lira.fusion.policies.checkpoint import Checkpoint, save_checkpoint
+from lira.fusion.policies.networks import CameraNet, LidarNet, Network
+from lira.fusion.teaching.curriculum import Curriculum, curriculum
+from lira.fusion.teaching.session import Same, Session
+from lira.fusion.teaching.teacher import ScriptedTeacher
+from lira.hal.errors import LiraError
+from lira.hal.messages import Action
+from lira.hal.profile import RobotProfile, load_profile
+from lira.hal.safety.governed import GovernedRobot
+from lira.sim_backend.catalogue import load_world
+from lira.sim_backend.foresight import Foresight, sketching
+from lira.sim_backend.twin import Twin
+from lira.tools.runs.progress import Progress
+
+BLIND_PX = 4
+
+
+def train_expert(kind: Sensor, task: str, profile: RobotProfile, seed: int, path: Path, command: str) -> bool:
+    """Train a task's camera or lidar expert and save it to `path` if it passes. Returns whether it did."""
+    torch.set_num_threads(1)
+    course = curriculum(kind, task)
+    world = load_world(course.world)
+    profile = blindfolded(profile) if kind == "lidar" else sketching(profile)
+    shape = profile.features
+    network: Network
+    network = CameraNet(shape.filters, seed=seed) if kind == "camera" else LidarNet(shape.bins, seed=seed)
+    novice = NetworkNovice(network, InlineTrainer(Learner(network, seed=seed, frozen_trunks=False)), LearningSettings())
+    progress = Progress()
+
+    def show(record: Record) -> None:
+        line = progress.note(record)
+        if line is not None:
+            print(line, flush=True)
+
+    twin = Twin(profile, world, seed=seed)
+    robot = GovernedRobot(twin)
+    robot.open()
+    try:
+        loop = ControlLoop(robot, truth=twin.state)
+        session = Session(robot, twin, loop, Journal(write=show), HgDagger(novice))
+        loop.arm()
+        with closing(ScriptedTeacher(Foresight(profile, world), profile, course.teacher, seed)) as teacher:
+            passed = session.teach(Same(course.drives), teacher, course.laps)
+    finally:
+        robot.close()
+    if passed:
+        cruise = measure_cruise(network, profile, course)
+        about = Checkpoint(kind, shape.bins, shape.filters, profile.name, cruise, command, seed)
+        save_checkpoint(path, network, replace(about, labels=novice.stored, training_steps=novice.training_steps))
+        print(f"{kind} expert: {novice.stored} labels, {novice.training_steps} training steps, saved to {path}")
+    return passed
+
+
+def provide(pair: str) -> None:
+    """Train the experts of a pair named TASK@SEED that are not there yet; others have to be there.
+
+    Raises `LiraError` for an expert that does not pass its curriculum.
+    """
+    found = seeded(pair)
+    if found is None:
+        return
+    task, seed = found
+    profile = load_profile(TASKS[task].profile)
+    for kind in SHIPPED:
+        path = folder_of(pair) / f"{kind}.safetensors"
+        if not path.exists() and not train_expert(kind, task, profile, seed, path, command(kind, task, profile, seed)):
+            raise LiraError(f"the {kind} expert of {pair} did not pass its curriculum", "Try another seed.")
+
+
+def command(kind: str, task: str, profile: RobotProfile, seed: int) -> str:
+    """Return the words that train an expert."""
+    words = "" if task == DEFAULT else f" --task {task}"
+    return f"lira train-expert {kind}{words} --profile {profile.name} --seed {seed}"
+
+
+def blindfolded(profile: RobotProfile) -> RobotProfile:
+    """Return the profile with a tiny picture: whoever sees with the lidar alone need not wait for a camera."""
+    camera = msgspec.structs.replace(profile.camera, width_px=BLIND_PX, height_px=BLIND_PX, encoding="png")
+    return msgspec.structs.replace(profile, camera=camera)
+
+
+def measure_cruise(network: Network, profile: RobotProfile, course: Curriculum) -> Action:
+    """Median action where the world is straight and empty: what the expert does with nothing to react to."""
+    robot = GovernedRobot(Twin(profile, load_world(course.cruise_world)))
+    robot.open()
+    try:
+        loop = ControlLoop(robot)
+        loop.arm()
+        alone = Alone("novice", lambda features: network.act(features.scan, features.image))
+        steps = [loop.step(alone) for _ in range(course.cruise_steps)]
+    finally:
+        robot.close()
+    actions = [step.proposal.choice.action for step in steps if step is not None]
+    linear, angular = np.median(np.asarray(actions), axis=0)
+    return float(linear), float(angular)
