@@ -5,7 +5,7 @@ TCP does; `delay_s` holds everything back, `copies` sends every datagram more th
 `lost` is the share of datagrams that do not arrive, `narrow_byte_s` all that fits through in a second either way: what
 does not is lost if it is a datagram, and waits if it is of a stream.
 
-python -m lira.tools.relay PORT TARGET_PORT     the same as a process of its own, which can be killed
+python -m lira.tools.launch.link_fault PORT TARGET_PORT     the same as a process of its own, which can be killed
 """
 
 import asyncio
