@@ -65,7 +65,8 @@ def closest(graph: Graph) -> Graph:
 
 def draw(graph: Graph, indent: str = "") -> list[str]:
     """One line for each node, those that import above those that are imported. Raises `CycleError`."""
-    order = list(TopologicalSorter(graph).static_order())[::-1]
+    # Sorted first: a set of names has another order in each run, and so would what is drawn from it.
+    order = list(TopologicalSorter({node: sorted(graph[node]) for node in graph}).static_order())[::-1]
     near = closest(graph)
     lines = []
     for node in order:

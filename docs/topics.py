@@ -8,7 +8,7 @@ from lira.hal.messages.ros_types import TYPES
 
 def topic_table() -> str:
     """Return one row for each topic."""
-    head = "| key | type | Hz | stale after | travels |\n|---|---|---|---|---|\n"
+    head = "| key | type | Hz | stale after | at most | travels |\n|---|---|---|---|---|---|\n"
     return head + "".join(_row(topic) for topic in TOPICS)
 
 
@@ -20,7 +20,19 @@ def hash_table() -> str:
 
 def _row(topic: Topic[object]) -> str:
     age = "never" if topic.max_age_s == float("inf") else f"{topic.max_age_s:g} s"
-    return f"| `{topic.key}` | `{topic.ros_type}` | {topic.rate_hz:g} | {age} | {_way(topic.qos)} |\n"
+    cells = [
+        f"`{topic.key}`",
+        f"`{topic.ros_type}`",
+        f"{topic.rate_hz:g}",
+        age,
+        _size(topic.max_bytes),
+        _way(topic.qos),
+    ]
+    return f"| {' | '.join(cells)} |\n"
+
+
+def _size(count: int) -> str:
+    return f"{count} B" if count < 1024 else f"{count // 1024} KiB"
 
 
 def _way(qos: Qos) -> str:

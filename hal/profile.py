@@ -3,6 +3,7 @@
 `thesis-sim` is the simulated robot of the thesis, `rosbot2` the Husarion ROSbot 2.0; a user's own is a TOML file.
 """
 
+import math
 from importlib import resources
 from itertools import pairwise
 from pathlib import Path
@@ -37,7 +38,6 @@ class Base(Table, frozen=True):
     length_m: Positive
     width_m: Positive
     height_m: Positive
-    wheel_radius_m: Positive
     track_m: Positive
     max_linear_m_s: Positive
     max_angular_rad_s: Positive
@@ -46,6 +46,7 @@ class Base(Table, frozen=True):
     max_angular_acceleration_rad_s2: Positive | None = None
     effective_track_m: Positive | None = None  # "wheels" only
     odometry_track_m: Positive | None = None  # "wheels" only
+    wheel_radius_m: Positive | None = None  # for the reader: nothing here turns a wheel by its angle
 
 
 class Lidar(Table, frozen=True):
@@ -63,6 +64,16 @@ class Lidar(Table, frozen=True):
     rate_hz: Positive
     noise_m: NotNegative = 0.0  # standard deviation of a range
     dropout: Annotated[float, Meta(ge=0.0, le=1.0)] = 0.0  # share of beams that read nan
+
+    @property
+    def full_turn(self) -> bool:
+        """Whether it sees all around, so that the last beam is the neighbour of the first."""
+        return self.fov_rad > math.tau - 1e-3
+
+    @property
+    def increment_rad(self) -> float:
+        """Angle between two beams."""
+        return self.fov_rad / (self.beams if self.full_turn else max(self.beams - 1, 1))
 
 
 class Camera(Table, frozen=True):

@@ -6,33 +6,34 @@ from collections.abc import Callable
 
 import numpy as np
 
+from lira.hal.bus.sensors import Stamped, observation_of
+from lira.hal.bus.topics import BATTERY, ODOM
 from lira.hal.messages import (
     STOP,
     Applied,
     BatteryState,
     Command,
     CourseState,
+    DepthImage,
     Episode,
     Image,
     Imu,
     LaserScan,
     Observation,
     Odometry,
+    Range,
     Reason,
 )
-from lira.hal.profile import RobotProfile
+from lira.hal.profile import Lidar, RobotProfile
 
 GRAY = 128
-BATTERY_V = 12.0
-ODOMETRY_HZ = 20.0
-BATTERY_HZ = 1.0
 
 
 class NullRobot:
     """Implements `hal.port.Robot` and `hal.port.Arena`. Its course is the x axis, without end or obstacle.
 
     Without a `clock` time passes only in `wait`. With one (such as `time.monotonic`, and a `sleep` to go with it) it
-    passes by itself. Every scan shows open space, every image is gray.
+    passes by itself. It has every sensor of its profile: scans, depths and ranges show open space, images are gray.
     """
 
     def __init__(
@@ -50,11 +51,10 @@ class NullRobot:
         self._seq = 0
         self._newest: Observation | None = None
         self._lock = threading.Lock()  # motion is asked for by whoever drives and whoever reads
-        lidar, camera = profile.lidar, profile.camera
-        full_turn = lidar.fov_rad > 2 * math.pi - 1e-3
-        self._increment_rad = lidar.fov_rad / (lidar.beams if full_turn else max(lidar.beams - 1, 1))
-        self._ranges = np.full(lidar.beams, np.inf, np.float32)
+        camera, depth = profile.camera, profile.depth
+        self._ranges = np.full(profile.lidar.beams, np.inf, np.float32)
         self._pixels = np.full((camera.height_px, camera.width_px, 3), GRAY, np.uint8)
+        self._depths = np.zeros((0, 0) if depth is None else (depth.height_px, depth.width_px), np.uint16)
 
     @property
     def profile(self) -> RobotProfile:
@@ -91,25 +91,26 @@ class NullRobot:
 
     def _capture(self) -> Observation:
         self._seq += 1
-        lidar = self._profile.lidar
-        x_m, y_m, yaw_rad = self._pose
-        odometry_s = self._last(ODOMETRY_HZ)
-        return Observation(
-            self._seq,
-            self._time_s,
-            scan=LaserScan(
-                self._last(lidar.rate_hz),
-                -lidar.fov_rad / 2,
-                self._increment_rad,
-                lidar.range_min_m,
-                lidar.range_max_m,
-                self._ranges,
-            ),
-            image=Image(self._last(self._profile.camera.rate_hz), self._pixels),
-            odom=Odometry(odometry_s, x_m, y_m, yaw_rad, self._twist.linear_m_s, self._twist.angular_rad_s),
-            imu=Imu(odometry_s, yaw_rad, self._twist.angular_rad_s, 0.0, 0.0),
-            battery=BatteryState(self._last(BATTERY_HZ), BATTERY_V),
-        )
+        profile, twist, (x_m, y_m, yaw_rad) = self._profile, self._twist, self._pose
+        newest: dict[str, Stamped] = {
+            "scan": self._scan(profile.lidar),
+            "camera": Image(self._last(profile.camera.rate_hz), self._pixels),
+            "odom": Odometry(self._last(ODOM.rate_hz), x_m, y_m, yaw_rad, twist.linear_m_s, twist.angular_rad_s),
+        }
+        if profile.depth is not None:
+            newest["depth"] = DepthImage(self._last(profile.depth.rate_hz), self._depths)
+        if profile.imu is not None:
+            newest["imu"] = Imu(self._last(profile.imu.rate_hz), yaw_rad, twist.angular_rad_s, 0.0, 0.0)
+        if profile.battery is not None:
+            newest["battery"] = BatteryState(self._last(BATTERY.rate_hz), profile.battery.full_v)
+        for ranger in profile.ranger:
+            stamp_s, limits = self._last(ranger.rate_hz), (ranger.range_min_m, ranger.range_max_m)
+            newest[ranger.frame_id] = Range(stamp_s, ranger.frame_id, math.inf, *limits)
+        return observation_of(self._seq, self._time_s, newest)
+
+    def _scan(self, lidar: Lidar) -> LaserScan:
+        limits = lidar.range_min_m, lidar.range_max_m
+        return LaserScan(self._last(lidar.rate_hz), -lidar.fov_rad / 2, lidar.increment_rad, *limits, self._ranges)
 
     def close(self) -> None:
         """Stop."""

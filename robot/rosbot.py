@@ -2,25 +2,21 @@
 
 import threading
 import time
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, TypeVar
 
-from lira.hal.bus.topics import BATTERY, CAMERA, DEPTH, IMU, ODOM, RANGES, SCAN, Topic
-from lira.hal.client.sensor_reader import Stamped
+from lira.hal.bus.sensors import observation_of, same_readings
 from lira.hal.clock import is_fresh
 from lira.hal.errors import ConfigError, DeviceError
 from lira.hal.messages import STOP, Applied, Command, DepthImage, LaserScan, Observation, Reason, Source
 from lira.hal.port import DeviceHealth
 from lira.hal.profile import RobotProfile
 from lira.robot.camera.device import CameraDevice
-from lira.robot.camera.source import Picture
+from lira.robot.camera.port import Picture
 from lira.robot.core2.device import Core2
 from lira.robot.rplidar.device import RPLidar
 from lira.robot.settings import Settings
 from lira.robot.supervisor import Keeper
-
-S = TypeVar("S", bound=Stamped)
 
 OPEN_S = 20.0  # a CORE2 boots for 2 s and may speak at three speeds
 BLIND_S = 0.5  # driven on no older scan than this
@@ -59,7 +55,7 @@ class Rosbot:
             self.lidar = RPLidar(devices.lidar, profile.lidar, devices.settings.lidar, self._see_scan)
             self._keepers["lidar"] = Keeper("lidar", self.lidar.session)
         if devices.camera is not None:
-            depth = devices.settings.camera.depth
+            depth = devices.settings.camera.depth or profile.depth is not None
             camera = CameraDevice(devices.camera, profile.camera, self._see_picture, devices.openni_folder, depth=depth)
             self._keepers["camera"] = Keeper("camera", camera.session)
 
@@ -84,24 +80,12 @@ class Rosbot:
         """Return the newest of every sensor; what is older than its topic allows is None."""
         if not self._open:
             raise DeviceError("the robot is not open", "Call open() first.")
-        now_s, readings, last = self.now(), self.base.readings, self._newest
-        picture = self._picture
-        ranges = (fresh_of(value, RANGES[name], now_s) for name, value in list(readings.ranges.items()))
-        observation = Observation(
-            0 if last is None else last.seq,
-            now_s,
-            scan=fresh_of(self._scan, SCAN, now_s),
-            image=picture if fresh_of(picture, CAMERA, now_s) is not None else None,
-            odom=fresh_of(readings.odom, ODOM, now_s),
-            imu=fresh_of(readings.imu, IMU, now_s),
-            battery=fresh_of(readings.battery, BATTERY, now_s),
-            ranges=tuple(value for value in ranges if value is not None),
-            depth=fresh_of(self._depth, DEPTH, now_s),
-        )
-        if last is not None and same(observation, last):
-            return last
-        self._newest = replace(observation, seq=observation.seq + 1)
-        return self._newest
+        last = self._newest
+        newest = {"scan": self._scan, "camera": self._picture, "depth": self._depth, **self.base.readings.by_name()}
+        observation = observation_of(1 if last is None else last.seq + 1, self.now(), newest)
+        if last is None or not same_readings(observation, last):
+            self._newest = last = observation
+        return last
 
     def drive(self, command: Command) -> Applied:
         """Send a velocity to the base, zero if it is not finite."""
@@ -177,15 +161,3 @@ class Rosbot:
         else:
             self._picture = picture
         self._news.set()
-
-
-def fresh_of(value: S | None, topic: Topic[Any], now_s: float) -> S | None:
-    """Return the value unless it is older than its topic allows."""
-    return value if value is not None and is_fresh(value.stamp_s, now_s, topic.max_age_s) else None
-
-
-def same(one: Observation, other: Observation) -> bool:
-    """Whether two observations hold the very same readings."""
-    names = ("scan", "image", "odom", "imu", "battery", "depth")
-    mine, theirs = ([*(getattr(seen, name) for name in names), *seen.ranges] for seen in (one, other))
-    return len(mine) == len(theirs) and all(a is b for a, b in zip(mine, theirs, strict=True))

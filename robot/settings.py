@@ -37,7 +37,7 @@ class BaseSettings(Table, frozen=True):
 
 
 class CameraSettings(Table, frozen=True):
-    """The camera. `depth`: grab its depth, too; only OpenNI2 cameras have any."""
+    """The camera. `depth`: grab its depth, too, though the profile has none; only OpenNI2 cameras have any."""
 
     depth: bool = False
 

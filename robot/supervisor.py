@@ -1,5 +1,6 @@
 """Keeps a device running in a thread of its own: what is lost is opened again, and says so meanwhile."""
 
+import sys
 import threading
 import time
 from collections.abc import Callable
@@ -56,9 +57,12 @@ class Keeper:
 
         Raises what the last try failed with after the time, at once if no further one would help.
         """
-        until_s = time.monotonic() + timeout_s
+        until_s, told = time.monotonic() + timeout_s, ""
         while not self._alive.wait(LOOK_S):
             failure = self._failure
+            if failure is not None and failure.what != told:
+                told = failure.what
+                print(f"{self.name}: {told}; trying on for {timeout_s:.0f} s", file=sys.stderr, flush=True)
             if isinstance(failure, UNMENDABLE) or (failure is not None and time.monotonic() > until_s):
                 raise failure
             if time.monotonic() > until_s:

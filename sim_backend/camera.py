@@ -21,8 +21,6 @@ FAR_M = 60.0
 SMALL_PX = 160 * 120
 OVERSAMPLE_WIDE = 8
 OVERSAMPLE_HIGH = 3
-JPEG_LIMIT_BYTES = 64_000
-JPEG_QUALITIES = (90, 75, 60, 45, 30, 15, 5)
 
 
 class PinholeCamera:
@@ -149,15 +147,3 @@ def add_noise(picture: ByteArray, noise_gray: float, rng: np.random.Generator) -
     noise = rng.standard_normal(picture.shape, dtype=np.float32) * noise_gray
     noisy: ByteArray = np.clip(np.rint(picture + noise), 0, 255).astype(np.uint8)
     return noisy
-
-
-def encode_jpeg(picture: ByteArray) -> bytes:
-    """Encode a gray picture as a JPEG in colour, at the best of a few qualities that fits on the link."""
-    colour = cv2.cvtColor(picture, cv2.COLOR_GRAY2BGR)
-    data = b""
-    for quality in JPEG_QUALITIES:
-        _, encoded = cv2.imencode(".jpg", colour, [cv2.IMWRITE_JPEG_QUALITY, quality])
-        data = encoded.tobytes()
-        if len(data) < JPEG_LIMIT_BYTES:
-            break
-    return data

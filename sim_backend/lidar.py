@@ -10,14 +10,9 @@ from lira.sim_backend.polyline import Floats
 from lira.sim_backend.scene import Scene
 
 
-def beam_angles(lidar: Lidar) -> tuple[Floats, float]:
-    """Angles [beams] from base_link's x, counter-clockwise, and their increment.
-
-    A sector includes both of its ends; a full turn begins behind and has no beam twice.
-    """
-    full_turn = lidar.fov_rad > math.tau - 1e-3
-    increment = lidar.fov_rad / (lidar.beams if full_turn else max(lidar.beams - 1, 1))
-    return np.arange(lidar.beams, dtype=np.float64) * increment - lidar.fov_rad / 2, increment
+def beam_angles(lidar: Lidar) -> Floats:
+    """Angles [beams] from base_link's x, counter-clockwise. A full turn begins behind."""
+    return np.arange(lidar.beams, dtype=np.float64) * lidar.increment_rad - lidar.fov_rad / 2
 
 
 class RayLidar:
@@ -27,7 +22,7 @@ class RayLidar:
         self._lidar = lidar
         self._scene = scene
         self._rng = rng
-        self._angles, self._increment = beam_angles(lidar)
+        self._angles = beam_angles(lidar)
 
     def request(self, x_m: float, y_m: float, yaw_rad: float) -> dict[str, object]:
         """Return the arguments of pybullet's `rayTestBatch` from a robot at this pose."""
@@ -51,7 +46,7 @@ class RayLidar:
         return LaserScan(
             stamp_s=stamp_s,
             angle_min=float(self._angles[0]),
-            angle_increment=self._increment,
+            angle_increment=lidar.increment_rad,
             range_min=lidar.range_min_m,
             range_max=lidar.range_max_m,
             ranges=self._spoil(ranges),

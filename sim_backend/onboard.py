@@ -42,13 +42,15 @@ class Accelerometer:
         )
 
 
-def read_rangers(rangers: tuple[Ranger, ...], cast: Cast, motion: Motion, now_s: float) -> tuple[Range, ...]:
-    """Measure with each ranger from the robot's pose: the nearest of a few rays. REP-117."""
-    if not rangers:
-        return ()
-    starts, ends = zip(*(_cone(ranger, motion) for ranger in rangers), strict=True)
-    free = cast(np.concatenate(starts), np.concatenate(ends)).reshape(len(rangers), CONE_RAYS).min(axis=1)
-    return tuple(_range(ranger, float(share), now_s) for ranger, share in zip(rangers, free, strict=True))
+def read_ranger(ranger: Ranger, cast: Cast, motion: Motion, now_s: float) -> Range:
+    """Measure with a ranger from the robot's pose: the nearest of a few rays. REP-117."""
+    free = float(cast(*_cone(ranger, motion)).min())
+    range_m = free * ranger.range_max_m
+    if free >= 1.0:
+        range_m = math.inf
+    elif range_m < ranger.range_min_m:
+        range_m = -math.inf
+    return Range(now_s, ranger.frame_id, range_m, ranger.range_min_m, ranger.range_max_m)
 
 
 def _cone(ranger: Ranger, motion: Motion) -> tuple[Floats, Floats]:
@@ -61,15 +63,6 @@ def _cone(ranger: Ranger, motion: Motion) -> tuple[Floats, Floats]:
     angles = yaw_rad + ranger.yaw_rad + ranger.fov_rad * np.linspace(-0.5, 0.5, CONE_RAYS)
     reach = ranger.range_max_m * np.stack([np.cos(angles), np.sin(angles), np.zeros(CONE_RAYS)], axis=1)
     return start, start + reach
-
-
-def _range(ranger: Ranger, free: float, now_s: float) -> Range:
-    range_m = free * ranger.range_max_m
-    if free >= 1.0:
-        range_m = math.inf
-    elif range_m < ranger.range_min_m:
-        range_m = -math.inf
-    return Range(now_s, ranger.frame_id, range_m, ranger.range_min_m, ranger.range_max_m)
 
 
 def read_battery(battery: Battery, now_s: float) -> BatteryState:

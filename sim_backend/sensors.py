@@ -1,26 +1,40 @@
 """What the twin's robot senses of its scene, each sensor captured anew only when its period has passed."""
 
 import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import partial
 from typing import Any, Literal
 
+import cv2
 import numpy as np
 
+from lira.hal.bus.sensors import SENSORS, Stamped
 from lira.hal.bus.topics import BATTERY
 from lira.hal.errors import ConfigError
-from lira.hal.messages import BatteryState, CompressedImage, DepthImage, Image, Imu, LaserScan, Range
+from lira.hal.messages import CompressedImage, DepthImage, Image
+from lira.hal.messages.compression import fit_jpeg
 from lira.hal.profile import Camera, RobotProfile
-from lira.sim_backend.camera import SMALL_PX, PinholeCamera, add_noise, encode_jpeg
+from lira.sim_backend.camera import SMALL_PX, PinholeCamera, add_noise
 from lira.sim_backend.drive import Motion
 from lira.sim_backend.layout import Layout
 from lira.sim_backend.lidar import RayLidar
-from lira.sim_backend.onboard import Accelerometer, read_battery, read_rangers
+from lira.sim_backend.onboard import Accelerometer, read_battery, read_ranger
 from lira.sim_backend.scene import Scene, quiet
 
 ROUNDING_S = 1e-9
 TRIAL_FRAMES = 3
-
+LASTING = {sensor.name for sensor in SENSORS if sensor.lasting}
 
 Renderer = Literal["auto", "tiny", "egl"]
+
+
+@dataclass(frozen=True, slots=True)
+class Device:
+    """One sensor: how often it measures, and what of a robot that moves like this, now."""
+
+    rate_hz: float
+    measure: Callable[[Motion, float], Stamped]
 
 
 class Sensors:
@@ -35,87 +49,62 @@ class Sensors:
         self._camera = open_camera(profile.camera, layout, renderer)
         self._scene = self._camera.scene
         self.renderer = "egl" if self._scene.egl else "tiny"
-        self._lidar = RayLidar(profile.lidar, self._scene, lidar_rng)
-        self._imu = None if profile.imu is None else Accelerometer(profile.imu, imu_rng)
-        self._battery: BatteryState | None = None
-        self.forget()
+        self._devices = self._build(profile, lidar_rng, imu_rng)
+        self._newest: dict[str, Stamped] = {}
+
+    def _build(
+        self, profile: RobotProfile, lidar_rng: np.random.Generator, imu_rng: np.random.Generator
+    ) -> dict[str, Device]:
+        """What the profile has, by the names in the table of sensors."""
+        lidar, depth, battery = RayLidar(profile.lidar, self._scene, lidar_rng), profile.depth, profile.battery
+        devices = {
+            "camera": Device(profile.camera.rate_hz, self._photograph),
+            "scan": Device(profile.lidar.rate_hz, lambda motion, now_s: lidar.scan(*_pose(motion), now_s)),
+        }
+        if depth is not None:
+            devices["depth"] = Device(
+                depth.rate_hz, lambda motion, now_s: DepthImage(now_s, self._camera.depth(depth, *_pose(motion)))
+            )
+        if profile.imu is not None:
+            devices["imu"] = Device(profile.imu.rate_hz, Accelerometer(profile.imu, imu_rng).read)
+        if battery is not None:
+            devices["battery"] = Device(BATTERY.rate_hz, lambda _, now_s: read_battery(battery, now_s))
+        for ranger in profile.ranger:
+            devices[ranger.frame_id] = Device(ranger.rate_hz, partial(read_ranger, ranger, self._scene.cast))
+        return devices
 
     def forget(self) -> None:
-        """Whatever was captured belongs to another episode; but for the battery."""
-        self._image: Image | CompressedImage | None = None
-        self._scan: LaserScan | None = None
-        self._depth: DepthImage | None = None
-        self._felt: Imu | None = None
-        self._near: tuple[Range, ...] = ()
+        """Whatever was captured belongs to another episode, but for what outlives it."""
+        self._newest = {name: value for name, value in self._newest.items() if name in LASTING}
 
     def arrange(self, layout: Layout) -> None:
         """Move the boxes."""
         self._scene.arrange(layout)
 
-    def observe(self, motion: Motion, now_s: float) -> dict[str, Any]:
-        """Return the newest of every sensor that the profile has, by its field of an `Observation`."""
-        return {
-            "image": self.image(motion, now_s),
-            "scan": self.scan(motion, now_s),
-            "depth": self.depth(motion, now_s),
-            "imu": self.imu(motion, now_s),
-            "ranges": self.ranges(motion, now_s),
-            "battery": self.battery(now_s),
-        }
+    def newest(self, motion: Motion, now_s: float) -> dict[str, Stamped]:
+        """Return the newest of every sensor, by its name; measures anew what is due."""
+        for name in self._devices:
+            self.read(name, motion, now_s)
+        return dict(self._newest)
 
-    def image(self, motion: Motion, now_s: float) -> Image | CompressedImage:
-        """Return the newest picture, encoded as the profile wants it to travel."""
+    def read(self, name: str, motion: Motion, now_s: float) -> Any:
+        """Return the newest of one sensor, measured anew if that is due. Raises `KeyError` if it is not there."""
+        device, last = self._devices[name], self._newest.get(name)
+        if last is None or now_s - last.stamp_s >= 1.0 / device.rate_hz - ROUNDING_S:
+            self._newest[name] = device.measure(motion, now_s)
+        return self._newest[name]
+
+    def _photograph(self, motion: Motion, now_s: float) -> Image | CompressedImage:
+        """A picture, encoded as the profile wants it to travel."""
         camera = self._profile.camera
-        if self._image is None or _is_due(self._image.stamp_s, camera.rate_hz, now_s):
-            picture = self._camera.render(*_pose(motion))
-            picture = add_noise(picture, camera.noise_gray, self._camera_rng)
-            if camera.encoding == "jpeg":
-                self._image = CompressedImage(now_s, encode_jpeg(picture))
-            else:
-                self._image = Image(now_s, np.repeat(picture[..., None], 3, axis=-1))
-        return self._image
-
-    def scan(self, motion: Motion, now_s: float) -> LaserScan:
-        """Return the newest turn of the lidar."""
-        if self._scan is None or _is_due(self._scan.stamp_s, self._profile.lidar.rate_hz, now_s):
-            self._scan = self._lidar.scan(*_pose(motion), now_s)
-        return self._scan
-
-    def depth(self, motion: Motion, now_s: float) -> DepthImage | None:
-        """Return the newest picture of distances, if the camera measures them."""
-        depth = self._profile.depth
-        if depth is not None and (self._depth is None or _is_due(self._depth.stamp_s, depth.rate_hz, now_s)):
-            self._depth = DepthImage(now_s, self._camera.depth(depth, *_pose(motion)))
-        return self._depth
-
-    def imu(self, motion: Motion, now_s: float) -> Imu | None:
-        """Return the newest reading of the IMU."""
-        imu = self._imu
-        if imu is not None and (self._felt is None or _is_due(self._felt.stamp_s, imu.rate_hz, now_s)):
-            self._felt = imu.read(motion, now_s)
-        return self._felt
-
-    def ranges(self, motion: Motion, now_s: float) -> tuple[Range, ...]:
-        """Return the newest readings of the rangers; all are read at the rate of the first."""
-        rangers = self._profile.ranger
-        if rangers and (not self._near or _is_due(self._near[0].stamp_s, rangers[0].rate_hz, now_s)):
-            self._near = read_rangers(rangers, self._scene.cast, motion, now_s)
-        return self._near
-
-    def battery(self, now_s: float) -> BatteryState | None:
-        """Return the newest voltage."""
-        battery = self._profile.battery
-        if battery is not None and (self._battery is None or _is_due(self._battery.stamp_s, BATTERY.rate_hz, now_s)):
-            self._battery = read_battery(battery, now_s)
-        return self._battery
+        picture = add_noise(self._camera.render(*_pose(motion)), camera.noise_gray, self._camera_rng)
+        if camera.encoding == "jpeg":
+            return CompressedImage(now_s, fit_jpeg(cv2.cvtColor(picture, cv2.COLOR_GRAY2BGR)))
+        return Image(now_s, np.repeat(picture[..., None], 3, axis=-1))
 
     def close(self) -> None:
         """Let go of the scene. May be called twice."""
         self._scene.close()
-
-
-def _is_due(stamp_s: float, rate_hz: float, now_s: float) -> bool:
-    return now_s - stamp_s >= 1.0 / rate_hz - ROUNDING_S
 
 
 def _pose(motion: Motion) -> tuple[float, float, float]:

@@ -6,6 +6,7 @@ import time
 
 import msgspec
 
+from lira.hal.bus.sensors import observation_of, same_readings
 from lira.hal.errors import ConfigError, DeviceError
 from lira.hal.messages import STOP, Applied, Command, CourseState, Episode, Observation, Reason, Source, Twist
 from lira.hal.profile import Base, RobotProfile
@@ -124,17 +125,14 @@ class Twin:
                 self._body.advance(self.now())
                 now_s, motion, odom = self._body.time_s, self._body.motion, self._body.measured()
             last = self._newest
-            seen = self._sensors.observe(motion, now_s)
-            if last is not None:
-                if last.odom is not None and _periods(now_s) == _periods(last.odom.stamp_s):
-                    odom = last.odom
-                stepped = self._factor is None and now_s > last.stamp_s
-                same = odom is last.odom and all(getattr(last, name) is value for name, value in seen.items())
-                if same and not stepped:
-                    return last
-            self._seq += 1
-            self._newest = Observation(self._seq, now_s, odom=odom, **seen)
-            return self._newest
+            if last is not None and last.odom is not None and _periods(now_s) == _periods(last.odom.stamp_s):
+                odom = last.odom
+            newest = {**self._sensors.newest(motion, now_s), "odom": odom}
+            observation = observation_of(self._seq + 1, now_s, newest)
+            if last is None or self._has_stepped(last, now_s) or not same_readings(observation, last):
+                self._seq += 1
+                self._newest = last = observation
+            return last
 
     def reset(self, episode: Episode) -> None:
         """Put the robot down anew; a new layout only moves the boxes. Time goes on."""
@@ -164,6 +162,10 @@ class Twin:
         self._body.course = Course(build(self.world, layout), self._body.course.radius_m)
         if self._sensors is not None:
             self._sensors.arrange(self.layout)
+
+    def _has_stepped(self, last: Observation, now_s: float) -> bool:
+        """Whether somebody let time pass: each step has an observation of its own, also one that saw nothing new."""
+        return self._factor is None and now_s > last.stamp_s
 
     def _forget(self) -> None:
         self._newest = None

@@ -9,6 +9,7 @@ from collections.abc import Generator
 
 import pytest
 from hypothesis import settings
+from kinds import kind_of
 
 # A shell that runs the suite in the background ignores SIGINT, and so would every process that a test starts.
 signal.signal(signal.SIGINT, signal.default_int_handler)
@@ -32,6 +33,12 @@ def fail_if_unexpected(report: pytest.TestReport | pytest.CollectReport) -> None
     if reason not in EXPECTED_SKIPS:
         report.outcome = "failed"
         report.longrepr = f"skipped in CI, which has everything it needs: {reason}"
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Mark every test by its kind (`kinds.py`)."""
+    for item in items:
+        item.add_marker(kind_of(item.path))
 
 
 if os.environ.get("CI") == "true":

@@ -104,7 +104,9 @@ def _check_shapes(checkpoint: Checkpoint, found: dict[str, tuple[int, ...]]) -> 
 
 
 def build(checkpoint: Checkpoint) -> Network:
-    """Make the network a checkpoint describes, with fresh weights."""
+    """Make the network a checkpoint describes, with fresh weights. Raises `ValueError` for too many examples."""
+    if not 0 <= checkpoint.examples <= MOST_EXAMPLES:
+        raise ValueError(f"a kernel of {checkpoint.examples} examples")
     if checkpoint.kind == "camera":
         return CameraNet(checkpoint.filters, px=checkpoint.px, seed=checkpoint.seed)
     if checkpoint.kind == "lidar":

@@ -480,4 +480,4 @@ def _check_address(endpoint: str | None) -> None:
         return
     match = re.fullmatch(r"(\[[0-9a-fA-F:.]+\]|[A-Za-z0-9_.-]+):(\d{1,5})", endpoint)
     if match is None or not 0 < int(match[2]) < 65536:
-        raise ConfigError(f"'{endpoint}' is no address", "Write HOST:PORT, for example 127.0.0.1:7447.")
+        raise ConfigError(f"'{endpoint}' is no address", f"Write HOST:PORT, for example {DEFAULT_ENDPOINT}.")

@@ -52,7 +52,7 @@ PICTURE = Qos(Reliability.RELIABLE, Priority.DATA_LOW)
 REPORT = Qos(Reliability.RELIABLE, Priority.DATA)
 LATCHED = Qos(Reliability.RELIABLE, Priority.DATA, latched=True)
 # Lockstep: nothing is lost and nothing overtakes, so one link and one priority. To wait is harmless when time waits.
-LOCKSTEP = Qos(Reliability.RELIABLE, Priority.DATA, express=True, wait=True)
+IN_LOCKSTEP = Qos(Reliability.RELIABLE, Priority.DATA, express=True, wait=True)
 
 
 # No payload is longer: what is, is dropped before anybody copies it.

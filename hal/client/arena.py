@@ -6,12 +6,12 @@ from dataclasses import replace
 import msgspec
 
 from lira.hal.bus.bus import Bus
+from lira.hal.bus.services import info_from_json, reset_time
 from lira.hal.bus.topics import INFO, RESET, SIM_STATE
 from lira.hal.client.remote import RESET_S, RemoteRobot
 from lira.hal.clock import ClockEstimate
 from lira.hal.errors import BusError
 from lira.hal.messages import STOP, Command, CourseState, Episode
-from lira.hal.server.info_service import info_from_json, reset_time
 
 MOMENT_S = 0.5
 POLL_S = 0.002

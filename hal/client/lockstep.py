@@ -7,10 +7,11 @@ step sees does not depend on how fast the messages came.
 import time
 
 from lira.hal.bus.bus import Bus
-from lira.hal.bus.topics import APPLIED, CLOCK, CMD_VEL, LOCKSTEP, SIM_STATE, TELEOP
-from lira.hal.client.sensor_reader import Senses
+from lira.hal.bus.topics import APPLIED, CLOCK, CMD_VEL, IN_LOCKSTEP, SIM_STATE, TELEOP
+from lira.hal.client.sensor_reader import SensorReader
 from lira.hal.errors import BusError
 from lira.hal.messages import STOP, Applied, Clock, Command, CourseState, Observation, Source
+from lira.hal.profile import RobotProfile
 
 ANSWER_S = 5.0  # wall time; a robot that is silent for longer is gone
 POLL_S = 0.0002
@@ -20,13 +21,13 @@ ROUNDING_S = 1e-6
 class LockstepLink:
     """Talks to a robot whose time waits for commands. Made after `info` was asked, so that an observation is here."""
 
-    def __init__(self, bus: Bus) -> None:
-        self._senses = Senses(bus)
+    def __init__(self, bus: Bus, profile: RobotProfile) -> None:
+        self._sensors = SensorReader(bus, profile)
         self._states = bus.reader(SIM_STATE)
         self._results = bus.reader(APPLIED)
         self._clock = bus.reader(CLOCK)
-        self._policy = bus.publisher(CMD_VEL, LOCKSTEP)
-        self._teleop = bus.publisher(TELEOP, LOCKSTEP)
+        self._policy = bus.publisher(CMD_VEL, IN_LOCKSTEP)
+        self._teleop = bus.publisher(TELEOP, IN_LOCKSTEP)
         self._applied = Applied(STOP, 0.0)
         self._observation = Observation(-1, 0.0)
         self._state: CourseState | None = None
@@ -113,7 +114,7 @@ class LockstepLink:
         return newest.attachment.seq, newest.message
 
     def _take(self, seq: int, clock: Clock) -> None:
-        self._observation = self._senses.observe(clock.stamp_s, seq)
+        self._observation = self._sensors.observe(clock.stamp_s, seq)
         state = self._states.newest()
         self._state = None if state is None else state.message
         self._answered = False

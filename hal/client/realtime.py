@@ -18,12 +18,23 @@ from dataclasses import replace
 
 from lira.hal.bus.bus import Bus, Publisher
 from lira.hal.bus.topics import APPLIED, CMD_VEL, SIM_STATE, TELEOP
-from lira.hal.client.sensor_reader import Sense, Senses
+from lira.hal.client.sensor_reader import Sense, SensorReader
 from lira.hal.clock import ClockEstimate
 from lira.hal.errors import BusError
-from lira.hal.messages import HELD, STOP, Applied, Command, CourseState, Observation, Reason, Source, Twist
-from lira.hal.safety.governor import is_neutral
-from lira.hal.safety.lease import session_of
+from lira.hal.messages import (
+    HELD,
+    STOP,
+    Applied,
+    Command,
+    CourseState,
+    Observation,
+    Reason,
+    Source,
+    Twist,
+    is_neutral,
+    session_of,
+)
+from lira.hal.profile import RobotProfile
 
 REPEAT_HZ = 20.0
 DECISION_S = 0.5  # age at which a decision is no longer sent
@@ -37,11 +48,11 @@ FAREWELL = 3  # neutral commands at the end: one may be lost
 
 
 class RealTimeLink:
-    """Talks to a robot whose time passes by itself, and that stops when policy is silent for `patience_s`."""
+    """Talks to a robot whose time passes by itself, and that stops when policy is silent for its time-out."""
 
-    def __init__(self, bus: Bus, patience_s: float) -> None:
-        self._patience_s = patience_s
-        self._senses = Senses(bus)
+    def __init__(self, bus: Bus, profile: RobotProfile) -> None:
+        self._patience_s = profile.control.policy_timeout_s
+        self._sensors = SensorReader(bus, profile)
         self._states = Sense(bus, SIM_STATE)
         self._results = bus.reader(APPLIED, depth=16)
         self._publishers = {Source.POLICY: bus.publisher(CMD_VEL), Source.TELEOP: bus.publisher(TELEOP)}
@@ -91,10 +102,10 @@ class RealTimeLink:
     def refresh(self, reset_s: float) -> None:
         """Forget what was captured before a reset, and wait a moment for what comes after it."""
         before = self.read()
-        self._senses.forget(reset_s)
+        self._sensors.forget(reset_s)
         self._states.forget(reset_s)
         deadline_s = time.monotonic() + MOMENT_S
-        while not _has_all(before, self.read()) and time.monotonic() < deadline_s:
+        while not self._sensors.has_again(before, self.read()) and time.monotonic() < deadline_s:
             time.sleep(POLL_S)
 
     def now(self) -> float:
@@ -104,7 +115,7 @@ class RealTimeLink:
 
     def read(self) -> Observation:
         """Return the newest of every sensor that is fresh."""
-        return self._senses.observe(self.now())
+        return self._sensors.observe(self.now())
 
     def state(self) -> CourseState | None:
         """Ground truth, None if none comes within a moment."""
@@ -190,7 +201,7 @@ class RealTimeLink:
         self._held.clear()
         self._newest = None
         self._repeat_s = 0.0
-        self._senses.restart(epoch)
+        self._sensors.restart(epoch)
         self._states.restart(epoch)
 
     def _note_stop(self, applied: Applied) -> None:
@@ -232,12 +243,6 @@ class RealTimeLink:
     def _send(self, commands: list[Command], time_s: float) -> None:
         for command in commands:
             _put(self._publishers[command.source], command, time_s)
-
-
-def _has_all(before: Observation, after: Observation) -> bool:
-    """Whether every sensor that spoke before speaks again."""
-    pairs = ((before.scan, after.scan), (before.image, after.image), (before.odom, after.odom))
-    return all(new is not None for old, new in pairs if old is not None)
 
 
 def _results_from(applied: Applied | None, command: Command, sent_s: float) -> bool:

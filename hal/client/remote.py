@@ -6,13 +6,13 @@ from contextlib import contextmanager
 import msgspec
 
 from lira.hal.bus.bus import CLOSE_S, DEFAULT_ENDPOINT, DEFAULT_ROBOT, Bus
+from lira.hal.bus.services import LOCKSTEP, Info, info_from_json, reset_time
 from lira.hal.bus.topics import INFO, RESET
 from lira.hal.client.lockstep import LockstepLink
 from lira.hal.client.realtime import RealTimeLink
 from lira.hal.errors import BusError
 from lira.hal.messages import Applied, Command, CourseState, Episode, Observation
 from lira.hal.profile import RobotProfile
-from lira.hal.server.info_service import LOCKSTEP, Info, info_from_json, reset_time
 
 INFO_S = 5.0
 AGAIN_S = 0.5  # to ask a robot that was just heard
@@ -64,8 +64,7 @@ class RemoteRobot:
     def open(self) -> None:
         """Find the robot. Raises `BusError` if nobody answers."""
         info = info_from_json(self._bus.ask(INFO, timeout_s=self._answer_s))
-        patience_s = info.profile.control.policy_timeout_s
-        link = LockstepLink(self._bus) if info.mode == LOCKSTEP else RealTimeLink(self._bus, patience_s)
+        link = (LockstepLink if info.mode == LOCKSTEP else RealTimeLink)(self._bus, info.profile)
         # Asked once more: the robot shows its observation before it answers, and by now the link listens.
         self._info = info_from_json(self._bus.ask(INFO, timeout_s=self._answer_s))
         self._link = link

@@ -1,20 +1,13 @@
 """A client's readers of everything a robot publishes, and the observation they add up to."""
 
-from typing import Any, Generic, Protocol, TypeVar
+from typing import Any, Generic, TypeVar
 
 from lira.hal.bus.bus import Bus, Received
-from lira.hal.bus.topics import BATTERY, CAMERA, IMU, ODOM, RANGES, SCAN, Topic
+from lira.hal.bus.sensors import Stamped, listened_to, observation_of
+from lira.hal.bus.topics import Topic
 from lira.hal.clock import AHEAD_S, is_fresh
 from lira.hal.messages import Observation
-
-
-class Stamped(Protocol):
-    """A message with a capture time."""
-
-    @property
-    def stamp_s(self) -> float:
-        """Capture time on the robot's clock."""
-
+from lira.hal.profile import RobotProfile
 
 S = TypeVar("S", bound=Stamped)
 
@@ -37,7 +30,7 @@ class Sense(Generic[S]):
 
     def restart(self, epoch: int) -> None:
         """Return nothing any more but what comes from this start of the robot, whose clock is another one."""
-        self._not_before_s, self._epoch = float("-inf"), epoch
+        self._not_before_s, self._epoch, self.seq = float("-inf"), epoch, -1
 
     def read(self, now_s: float) -> S | None:
         """Return the newest value if it is fresh at `now_s` on the robot's clock."""
@@ -57,35 +50,31 @@ class Sense(Generic[S]):
         return newest.message
 
 
-class Senses:
-    """All sensors of a robot."""
+class SensorReader:
+    """All sensors of the robot of a profile."""
 
-    def __init__(self, bus: Bus) -> None:
-        self._scan = Sense(bus, SCAN)
-        self._image = Sense(bus, CAMERA)
-        self._odom = Sense(bus, ODOM)
-        self._imu = Sense(bus, IMU)
-        self._battery = Sense(bus, BATTERY)
-        self._ranges = [Sense(bus, topic) for topic in RANGES.values()]
+    def __init__(self, bus: Bus, profile: RobotProfile) -> None:
+        self._senses = [(sensor, Sense[Any](bus, sensor.topic)) for sensor in listened_to(profile)]
 
     def forget(self, before_s: float) -> None:
-        """Return nothing any more that was captured before that time. A battery outlives an episode."""
-        for sense in self._episodic():
-            sense.forget(before_s)
-
-    def _episodic(self) -> list[Sense[Any]]:
-        return [self._scan, self._image, self._odom, self._imu, *self._ranges]
+        """Return nothing any more that was captured before that time, but for what outlives an episode."""
+        for sensor, sense in self._senses:
+            if not sensor.lasting:
+                sense.forget(before_s)
 
     def restart(self, epoch: int) -> None:
         """Return nothing any more but what comes from this start of the robot, whose clock is another one."""
-        for sense in (*self._episodic(), self._battery):
+        for _, sense in self._senses:
             sense.restart(epoch)
 
     def observe(self, now_s: float, seq: int | None = None) -> Observation:
         """Put the fresh ones together. Without a `seq` it is the newest that came with any of them."""
-        scan, image, odom = self._scan.read(now_s), self._image.read(now_s), self._odom.read(now_s)
-        imu, battery = self._imu.read(now_s), self._battery.read(now_s)
-        ranges = tuple(value for sense in self._ranges if (value := sense.read(now_s)) is not None)
+        newest = {sensor.name: sense.read(now_s) for sensor, sense in self._senses}
         if seq is None:
-            seq = max(self._scan.seq, self._image.seq, self._odom.seq, self._imu.seq, 0)
-        return Observation(seq, now_s, scan, image, odom, imu, battery, ranges)
+            seq = max(0, *(sense.seq for _, sense in self._senses))
+        return observation_of(seq, now_s, newest)
+
+    def has_again(self, before: Observation, after: Observation) -> bool:
+        """Whether every sensor that measured something before an episode ended does so in the new one."""
+        episodic = [sensor for sensor, _ in self._senses if not sensor.lasting]
+        return all(sensor.value(after) is not None for sensor in episodic if sensor.value(before) is not None)

@@ -1,17 +1,26 @@
 """The values that cross modules. Messages that mirror ROS keep its field names."""
 
-from lira.hal.messages.values import (
+from lira.hal.messages.motion import (
     HELD,
+    NEUTRAL_LIMIT,
     STOP,
+    Applied,
+    Command,
+    Reason,
+    Source,
+    Twist,
+    TwistStamped,
+    is_neutral,
+    session_of,
+)
+from lira.hal.messages.values import (
     Action,
     Along,
-    Applied,
     Aside,
     BatteryState,
     Bool,
     ByteArray,
     Clock,
-    Command,
     CompressedImage,
     CourseState,
     Decision,
@@ -32,17 +41,14 @@ from lira.hal.messages.values import (
     OperatorAnswer,
     OperatorRequest,
     Range,
-    Reason,
     Request,
     Seed,
-    Source,
-    Twist,
-    TwistStamped,
     WordArray,
 )
 
 __all__ = [
     "HELD",
+    "NEUTRAL_LIMIT",
     "STOP",
     "Action",
     "Along",
@@ -80,4 +86,6 @@ __all__ = [
     "Twist",
     "TwistStamped",
     "WordArray",
+    "is_neutral",
+    "session_of",
 ]

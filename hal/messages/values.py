@@ -18,94 +18,6 @@ WordArray = NDArray[np.uint16]
 
 
 @dataclass(frozen=True, slots=True)
-class Twist:
-    """Planar velocity of base_link (geometry_msgs/Twist: linear.x, angular.z)."""
-
-    linear_m_s: float
-    angular_rad_s: float
-
-
-STOP = Twist(0.0, 0.0)
-
-
-@dataclass(frozen=True, slots=True)
-class TwistStamped:
-    """geometry_msgs/TwistStamped: what newer ROS 2 controllers want instead; `stamp_s` is when it was decided."""
-
-    stamp_s: float
-    twist: Twist
-
-
-class Source(StrEnum):
-    """Who a command comes from, or who drives."""
-
-    NONE = "none"
-    POLICY = "policy"
-    TELEOP = "teleop"
-
-
-class Reason(StrEnum):
-    """Why the wheels get what they get."""
-
-    OK = "ok"
-    NO_COMMAND = "no_command"  # nothing has been commanded yet
-    STALE = "stale"  # the newest command is older than its time-out, or a device is lost: `clamps` names it
-    NEUTRAL_FIRST = "neutral_first"  # stopped or just started: a neutral command has to come first
-    REFUSED = "refused"  # the newest command was refused (non-finite, out of order)
-    OBSTACLE = "obstacle"  # something is in the way, or the lidar does not say
-    ESTOP = "estop"  # the emergency stop is pressed
-
-
-# A robot that stopped by itself is armed by the next zero: that has to be somebody's decision.
-HELD = frozenset({Reason.STALE, Reason.NEUTRAL_FIRST, Reason.REFUSED, Reason.ESTOP})
-
-
-@dataclass(frozen=True, slots=True)
-class Command:
-    """A wish to move, in SI units.
-
-    `stamp_s` is when it was decided, `answers` the sequence number of the observation it answers (-1: none).
-    `released` marks the last command of a commander: the teleop command that follows the release of the dead-man (the
-    wheel goes back to the policy), or a policy's farewell. `commander` is the name on the certificate of whoever
-    commands, "" without keys; `epoch` is their session, which they keep to themselves, and `seq` its count.
-    """
-
-    twist: Twist
-    stamp_s: float
-    source: Source = Source.POLICY
-    answers: int = -1
-    released: bool = False
-    epoch: int = 0
-    seq: int = -1
-    commander: str = ""
-
-    @property
-    def token(self) -> tuple[str, int]:
-        """Who commands: the name, and the session, which nobody else knows."""
-        return self.commander, self.epoch
-
-
-@dataclass(frozen=True, slots=True)
-class Applied:
-    """What the base really got, from whom, and why (`cmd_vel/applied`).
-
-    `commander`, `session` and `seq` name the command it came from, `command_age_s` says how old that was. `session` is
-    a digest of the commander's epoch (`hal.lease.session_of`): it knows its own by that, and nobody learns the epoch.
-    """
-
-    twist: Twist
-    stamp_s: float
-    source: Source = Source.NONE
-    reason: Reason = Reason.NO_COMMAND
-    clamps: tuple[str, ...] = ()
-    answers: int = -1
-    command_age_s: float = float("nan")
-    session: int = 0
-    seq: int = -1
-    commander: str = ""
-
-
-@dataclass(frozen=True, slots=True)
 class Bool:
     """std_msgs/Bool."""
 
@@ -278,6 +190,8 @@ class Clock:
 class Observation:
     """The newest of every sensor at `stamp_s`; a sensor that is absent or stale is None.
 
+    `hal.bus.sensors` has a row for each. Pictures may come compressed, as they travelled.
+
     `seq` numbers observations; a command names the one it answers.
     """
 
@@ -289,7 +203,7 @@ class Observation:
     imu: Imu | None = None
     battery: BatteryState | None = None
     ranges: tuple[Range, ...] = field(default=())
-    depth: DepthImage | None = None
+    depth: DepthImage | CompressedImage | None = None
 
 
 @dataclass(frozen=True, slots=True)

@@ -14,13 +14,12 @@ from collections import Counter
 from dataclasses import replace
 
 from lira.hal.clock import AHEAD_S
-from lira.hal.messages import STOP, Applied, Command, Reason, Source, Twist
+from lira.hal.messages import STOP, Applied, Command, Reason, Source, Twist, is_neutral, session_of
 from lira.hal.profile import RobotProfile
 from lira.hal.safety.arming import TRANSITIONS, Event, State
-from lira.hal.safety.lease import Lease, Token, session_of
+from lira.hal.safety.lease import Lease, Token
 from lira.hal.safety.protective_field import Clearance, limit_speed
 
-NEUTRAL_LIMIT = 1e-6  # below this, in m/s and rad/s, a command is neutral
 ROUNDING_S = 1e-6  # stamps travel in whole nanoseconds; sums of periods are less exact than that
 # The watchdog strikes at the time-out. A command that comes late by less than its own period is obeyed if the watchdog
 # has not struck: without this a stream at exactly the time-out would hang on rounding.
@@ -216,11 +215,6 @@ def _ramp(wanted: float, before: float, limit: float | None, passed_s: float) ->
         return wanted
     start = abs(before) if wanted * before > 0.0 else 0.0
     return math.copysign(min(abs(wanted), start + limit * passed_s), wanted)
-
-
-def is_neutral(twist: Twist) -> bool:
-    """Whether a command asks for no motion at all."""
-    return abs(twist.linear_m_s) < NEUTRAL_LIMIT and abs(twist.angular_rad_s) < NEUTRAL_LIMIT
 
 
 def _is_finite(twist: Twist) -> bool:

@@ -6,17 +6,11 @@ commander says so, or `ttl_s` after its last command. Whoever lost it by silence
 same session: what is still on its way from there is old.
 """
 
-import hashlib
 import math
 from collections import deque
 
 REMEMBERED = 64  # sessions that lost the lease
 Token = tuple[str, int]
-
-
-def session_of(epoch: int) -> int:
-    """What may be told of an epoch (64 bits) to everybody: who has it knows it again, and nobody gets it from there."""
-    return int.from_bytes(hashlib.blake2b(epoch.to_bytes(8, "little"), digest_size=8).digest(), "little")
 
 
 class Lease:

@@ -4,9 +4,10 @@ import threading
 from collections.abc import Callable
 
 from lira.hal.bus.bus import Bus
+from lira.hal.bus.services import Info
 from lira.hal.bus.topics import SIM_STATE
 from lira.hal.port import Arena
-from lira.hal.server.info_service import Desk, Info
+from lira.hal.server.info_service import Desk
 
 POLL_S = 0.005
 

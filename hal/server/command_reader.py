@@ -6,8 +6,7 @@ from collections.abc import Hashable
 from lira.hal.bus.attachment import Attachment
 from lira.hal.bus.bus import Bus, Received
 from lira.hal.bus.topics import CMD_VEL, ESTOP, TELEOP, Topic, commander_of, named
-from lira.hal.messages import Command, Source, Twist
-from lira.hal.safety.governor import is_neutral
+from lira.hal.messages import Command, Source, Twist, is_neutral
 
 EPOCHS = 1 << 64
 DEPTH = 32  # a neutral command must not be lost under the motion that follows it

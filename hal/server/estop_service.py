@@ -11,24 +11,11 @@ from collections.abc import Callable
 import msgspec
 
 from lira.hal.bus.bus import Bus, Question
+from lira.hal.bus.services import EstopState
 from lira.hal.bus.topics import ESTOP_LOOK, ESTOP_PRESS, ESTOP_RELEASE
-from lira.hal.errors import BusError
 from lira.hal.safety.governed import GovernedRobot
 
 LOOK_S = 0.005
-ANSWER_S = 2.0
-
-
-class EstopState(msgspec.Struct, frozen=True):
-    """What the robot acknowledges: the governor's state, and how many commands it has refused, by reason."""
-
-    state: str
-    refused: dict[str, int]
-
-    @property
-    def pressed(self) -> bool:
-        """Whether the emergency stop holds the robot."""
-        return self.state == "emergency"
 
 
 class EstopDesk:
@@ -54,29 +41,3 @@ class EstopDesk:
     def _do(self, act: Callable[[], object], question: Question) -> None:
         act()
         question.answer(msgspec.json.encode(EstopState(self._robot.state, self._robot.refused)))
-
-
-def press_estop(bus: Bus, timeout_s: float = ANSWER_S, epoch: int | None = None) -> EstopState:
-    """Stop the robot and wait for its acknowledgement. Raises `BusError` if none comes: then assume that it moves.
-
-    With `epoch` only the robot of that session acknowledges: the one that the caller hears.
-    """
-    return _ask(bus, ESTOP_PRESS, timeout_s, epoch)
-
-
-def release_estop(bus: Bus, timeout_s: float = ANSWER_S, epoch: int | None = None) -> EstopState:
-    """Let the robot go, which then waits for a neutral command. Raises `BusError`, also for who may not release."""
-    return _ask(bus, ESTOP_RELEASE, timeout_s, epoch)
-
-
-def look_at_estop(bus: Bus, timeout_s: float = ANSWER_S) -> EstopState:
-    """Ask how it stands. Raises `BusError`."""
-    return _ask(bus, ESTOP_LOOK, timeout_s, None)
-
-
-def _ask(bus: Bus, key: str, timeout_s: float, epoch: int | None) -> EstopState:
-    answer = bus.answer(key, timeout_s=timeout_s, epoch=epoch)
-    try:
-        return msgspec.json.decode(answer.payload, type=EstopState)
-    except msgspec.MsgspecError as error:
-        raise BusError(f"the robot answers '{key}' with what is not understood: {error}") from error

@@ -1,56 +1,18 @@
 """The HAL server's front desk: who am I talking to, and, for a twin, start afresh."""
 
 from collections.abc import Callable
-from typing import Annotated, Literal
 
 import msgspec
 
 from lira.hal.bus.bus import Bus, Question
+from lira.hal.bus.services import Info
 from lira.hal.bus.topics import INFO, RESET
-from lira.hal.errors import BusError, CodecError, LiraError
+from lira.hal.errors import CodecError, LiraError
 from lira.hal.messages import Episode
-from lira.hal.messages.bounds import LARGEST
 from lira.hal.messages.codec import decode_json
 from lira.hal.port import Arena
-from lira.hal.profile import RobotProfile
 
-REALTIME: Literal["realtime"] = "realtime"
-LOCKSTEP: Literal["lockstep"] = "lockstep"
 RESETS = 1  # at a time
-
-Token = Annotated[int, msgspec.Meta(ge=0)]  # msgspec keeps integers within 64 bits
-Moment = Annotated[float, msgspec.Meta(ge=-LARGEST, le=LARGEST)]
-
-
-class Info(msgspec.Struct, frozen=True):
-    """What a robot says about itself. `arena` is whatever its twin says about its world, null for a real floor."""
-
-    profile: RobotProfile
-    mode: Literal["realtime", "lockstep"]
-    epoch: Token
-    arena: msgspec.Raw = msgspec.Raw(b"null")
-
-    def to_json(self) -> bytes:
-        """Encode for the bus."""
-        return msgspec.json.encode(self)
-
-
-def info_from_json(data: bytes) -> Info:
-    """Decode what `Info.to_json` wrote. Raises `BusError`."""
-    try:
-        info: Info = decode_json(Info, data)
-    except CodecError as error:
-        raise BusError(f"the robot says what is not understood: {error}", "Run one version on both sides.") from error
-    return info
-
-
-def reset_time(answer: bytes) -> float:
-    """Return when a reset happened, from the robot's answer to it. Raises `BusError`."""
-    try:
-        moment_s: float = decode_json(Moment, answer)
-    except CodecError as error:
-        raise BusError(f"the robot says what is not understood: {error}", "Run one version on both sides.") from error
-    return moment_s
 
 
 class Desk:

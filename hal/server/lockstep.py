@@ -10,14 +10,14 @@ import time
 from dataclasses import replace
 
 from lira.hal.bus.bus import Bus
-from lira.hal.bus.topics import APPLIED, CAMERA, CLOCK, LOCKSTEP, SIM_STATE, TELEOP
+from lira.hal.bus.topics import APPLIED, CLOCK, IN_LOCKSTEP, SIM_STATE, TELEOP
 from lira.hal.messages import Clock, Command, Observation
 from lira.hal.port import Arena
 from lira.hal.safety.governed import GovernedRobot
 from lira.hal.server.command_reader import Inlet
 from lira.hal.server.estop_service import EstopDesk
 from lira.hal.server.info_service import Desk
-from lira.hal.server.sensor_publisher import Outlet
+from lira.hal.server.sensor_publisher import SensorPublisher
 
 REPEAT_S = 1.0  # wall time after which an unanswered observation is sent again, to whoever listens by now
 POLL_S = 0.0002
@@ -35,10 +35,10 @@ class LockstepLoop:
         self._boundary = bus.boundary
         self._inlet = Inlet(bus)
         self._estop = EstopDesk(robot, bus)
-        self._outlet = Outlet(bus, robot.profile.camera, lockstep=True)
-        self._applied = bus.publisher(APPLIED, LOCKSTEP)
-        self._state = bus.publisher(SIM_STATE, LOCKSTEP)
-        self._clock = bus.publisher(CLOCK, LOCKSTEP)
+        self._sensors = SensorPublisher(bus, robot.profile, lockstep=True)
+        self._applied = bus.publisher(APPLIED, IN_LOCKSTEP)
+        self._state = bus.publisher(SIM_STATE, IN_LOCKSTEP)
+        self._clock = bus.publisher(CLOCK, IN_LOCKSTEP)
         self._observation = Observation(0, 0.0)
 
     def run(self, stop: threading.Event) -> None:
@@ -57,9 +57,8 @@ class LockstepLoop:
         """Publish the newest observation, the clock last: whoever sees it has the rest."""
         self._observation = observation = self._robot.read()
         now_s, seq = self._robot.now(), observation.seq
-        self._outlet.put(observation, now_s)
-        with self._boundary.guard(CAMERA.key):
-            self._outlet.put_image(observation, now_s)
+        self._sensors.put(observation, now_s)
+        self._sensors.put_pictures(observation, now_s)
         if self._arena is not None:
             with self._boundary.guard(SIM_STATE.key):
                 self._state.put(self._arena.state(), now_s, seq=seq)

@@ -3,7 +3,7 @@
 - commands: polls them, lets the governor judge, moves the base, strikes when they stop coming;
 - applied: tells the bus what came of them;
 - sensors: opens and reads the robot, publishes what is new, answers queries;
-- images: compresses and sends them, if anybody listens, and skips what it has no time for.
+- pictures: compresses and sends them, if anybody listens, and skips what it has no time for.
 """
 
 import threading
@@ -11,13 +11,13 @@ import time
 from collections import deque
 
 from lira.hal.bus.bus import Bus
-from lira.hal.bus.topics import APPLIED, CAMERA, CMD_VEL, DEPTH, SIM_STATE
+from lira.hal.bus.topics import APPLIED, CMD_VEL, SIM_STATE
 from lira.hal.messages import Applied, Observation, Reason
 from lira.hal.port import Arena
 from lira.hal.safety.governed import GovernedRobot
 from lira.hal.server.command_reader import Inlet
 from lira.hal.server.info_service import Desk
-from lira.hal.server.sensor_publisher import Outlet
+from lira.hal.server.sensor_publisher import SensorPublisher
 
 POLL_S = 0.002  # how long a command may lie
 WATCHDOG_S = 0.02
@@ -95,15 +95,21 @@ class AppliedLoop:
 
 
 class SensorLoop:
-    """Publishes what is new, except images, which it hands to `ImageLoop`."""
+    """Publishes what is new, except pictures, which it hands to `PictureLoop`."""
 
     def __init__(
-        self, robot: GovernedRobot, bus: Bus, outlet: Outlet, images: "ImageLoop", desk: Desk, arena: Arena | None
+        self,
+        robot: GovernedRobot,
+        bus: Bus,
+        sensors: SensorPublisher,
+        pictures: "PictureLoop",
+        desk: Desk,
+        arena: Arena | None,
     ) -> None:
         self._robot = robot
-        self._outlet = outlet
+        self._sensors = sensors
         self._boundary = bus.boundary
-        self._images = images
+        self._pictures = pictures
         self._desk = desk
         self._arena = arena
         self._state = bus.publisher(SIM_STATE)
@@ -118,21 +124,20 @@ class SensorLoop:
 
     def _show(self) -> None:
         observation, now_s = self._robot.read(), self._robot.now()
-        self._outlet.put(observation, now_s)
-        self._images.offer(observation)
+        self._sensors.put(observation, now_s)
+        self._pictures.offer(observation)
         if self._arena is not None and now_s >= self._state_due_s:
             self._state_due_s = now_s + 1.0 / SIM_STATE.rate_hz
             with self._boundary.guard(SIM_STATE.key):
                 self._state.put(self._arena.state(), now_s, seq=observation.seq)
 
 
-class ImageLoop:
-    """Sends the newest image; one that is still waiting when the next comes is dropped."""
+class PictureLoop:
+    """Sends the newest pictures; one that is still waiting when the next comes is dropped."""
 
-    def __init__(self, robot: GovernedRobot, bus: Bus, outlet: Outlet) -> None:
+    def __init__(self, robot: GovernedRobot, sensors: SensorPublisher) -> None:
         self._robot = robot
-        self._boundary = bus.boundary
-        self._outlet = outlet
+        self._sensors = sensors
         self._newest: Observation | None = None
         self._offered = threading.Condition()
 
@@ -149,12 +154,4 @@ class ImageLoop:
                 self._offered.wait_for(lambda: self._newest is not None, timeout=JOIN_S / 4)
                 observation, self._newest = self._newest, None
             if observation is not None:
-                self._send(observation)
-
-    def _send(self, observation: Observation) -> None:
-        if self._outlet.image_wanted:
-            with self._boundary.guard(CAMERA.key):
-                self._outlet.put_image(observation, self._robot.now())
-        if self._outlet.depth_wanted:
-            with self._boundary.guard(DEPTH.key):
-                self._outlet.put_depth(observation, self._robot.now())
+                self._sensors.put_pictures(observation, self._robot.now())

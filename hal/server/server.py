@@ -9,17 +9,18 @@ from types import FrameType
 import msgspec
 
 from lira.hal.bus.bus import Bus
+from lira.hal.bus.services import LOCKSTEP, REALTIME, Info
 from lira.hal.bus.topics import INFO
 from lira.hal.errors import BusError
 from lira.hal.port import Arena
 from lira.hal.safety.governed import GovernedRobot
 from lira.hal.server.diagnostics import Reporter
 from lira.hal.server.estop_service import EstopDesk
-from lira.hal.server.info_service import LOCKSTEP, REALTIME, Desk, Info
+from lira.hal.server.info_service import Desk
 from lira.hal.server.instance import only_instance
 from lira.hal.server.lockstep import LockstepLoop
-from lira.hal.server.realtime import JOIN_S, AppliedLoop, CommandLoop, ImageLoop, SensorLoop
-from lira.hal.server.sensor_publisher import Outlet
+from lira.hal.server.realtime import JOIN_S, AppliedLoop, CommandLoop, PictureLoop, SensorLoop
+from lira.hal.server.sensor_publisher import SensorPublisher
 
 LOOK_S = 0.05
 RIVAL_S = 0.5  # how long to listen for another robot of the same name
@@ -82,14 +83,14 @@ class HalServer:
     def _run_realtime(self, stop: threading.Event) -> None:
         crew = _Crew(stop)
         opened, wheels_still = threading.Event(), threading.Event()
-        outlet = Outlet(self._bus, self._robot.profile.camera, lockstep=False)
-        images = ImageLoop(self._robot, self._bus, outlet)
+        publisher = SensorPublisher(self._bus, self._robot.profile, lockstep=False)
+        pictures = PictureLoop(self._robot, publisher)
 
         def sense() -> None:
             # What opens the devices reads and closes them: some are bound to their thread.
             self._robot.open()
             try:
-                loop = SensorLoop(self._robot, self._bus, outlet, images, self._desk(), self._arena)
+                loop = SensorLoop(self._robot, self._bus, publisher, pictures, self._desk(), self._arena)
                 opened.set()
                 loop.run(wheels_still)
             finally:
@@ -102,7 +103,7 @@ class HalServer:
         commands = CommandLoop(self._robot, self._bus, applied)
         wheels = crew.start("commands", lambda: commands.run(stop))
         crew.start("applied", lambda: applied.run(stop))
-        crew.start("images", lambda: images.run(stop))
+        crew.start("pictures", lambda: pictures.run(stop))
         estop = EstopDesk(self._robot, self._bus)
         crew.start("estop", lambda: estop.run(stop))
         reporter = Reporter(self._robot, self._bus)

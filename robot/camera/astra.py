@@ -17,6 +17,7 @@ from lira.hal.messages import DepthImage, Image
 
 # A driver's own thread may still be at its last picture when the stream has stopped; to close it then crashes.
 SETTLE_S = 0.15
+EARLY = 0.9  # of the period of a depth: a frame that comes a little early still counts
 INSTALL = (
     "Give the folder of Orbbec's OpenNI2 (with libOpenNI2.so and OpenNI2/Drivers in it) by --openni or OPENNI2_REDIST."
 )
@@ -74,7 +75,7 @@ class OpenniSource:
         if ready is self._depth:
             if stamp_s < self._depth_due_s:
                 return None
-            self._depth_due_s = stamp_s + 0.5 / DEPTH.rate_hz
+            self._depth_due_s = stamp_s + EARLY / DEPTH.rate_hz
         try:
             return depth_of(frame, stamp_s) if ready is self._depth else colour_of(frame, stamp_s)
         except FAULTS as error:

@@ -5,20 +5,18 @@ import time
 from collections.abc import Callable
 from pathlib import Path
 
-import cv2
-
 from lira.hal.errors import DeviceError, SensorError
 from lira.hal.messages import CompressedImage, DepthImage
+from lira.hal.messages.compression import PICTURE_LIMIT_BYTES, fit_jpeg
 from lira.hal.messages.images import JPEG_START
 from lira.hal.profile import Camera
 from lira.robot.camera.decode import check, decode
-from lira.robot.camera.source import Picture, Source, open_source
+from lira.robot.camera.port import Picture, Source
+from lira.robot.camera.source import open_source
 
 GRAB_S = 0.2
 FIRST_S = 5.0  # some cameras take their time to begin
 SILENCE_S = 1.0
-LIMIT_BYTES = 64_000  # what travels over the bus
-QUALITIES = (75, 50, 25, 10)
 
 
 class CameraDevice:
@@ -88,11 +86,6 @@ def shrink(picture: CompressedImage) -> CompressedImage:
     Raises `SensorError` for what is no JPEG that may be decoded.
     """
     check(picture.data, JPEG_START)
-    if len(picture.data) <= LIMIT_BYTES:
+    if len(picture.data) <= PICTURE_LIMIT_BYTES:
         return picture
-    pixels, data = decode(picture.data), picture.data
-    for quality in QUALITIES:
-        data = cv2.imencode(".jpg", pixels, [cv2.IMWRITE_JPEG_QUALITY, quality])[1].tobytes()
-        if len(data) <= LIMIT_BYTES:
-            break
-    return CompressedImage(picture.stamp_s, data)
+    return CompressedImage(picture.stamp_s, fit_jpeg(decode(picture.data)))

@@ -11,7 +11,7 @@ from lira.hal.errors import DeviceError, SensorError
 from lira.hal.messages import CompressedImage, Image
 from lira.hal.messages.images import JPEG_START
 from lira.robot.camera.decode import check, decode
-from lira.robot.camera.source import LARGEST_BYTES, Picture
+from lira.robot.camera.port import LARGEST_BYTES, Picture
 
 PERIOD_S = 1 / 15
 KINDS = {".jpg", ".jpeg", ".png"}

@@ -8,7 +8,7 @@ from urllib.parse import urlsplit
 
 from lira.hal.errors import DeviceError
 from lira.hal.messages import CompressedImage
-from lira.robot.camera.source import LARGEST_BYTES
+from lira.robot.camera.port import LARGEST_BYTES
 
 SILENCE_S = 1.0
 READ_SIZE = 65536

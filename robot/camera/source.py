@@ -1,28 +1,10 @@
-"""One port for every source of pictures, and which URL names which."""
+"""Which URL names which source of pictures."""
 
 from pathlib import Path
-from typing import Protocol
 from urllib.parse import urlsplit
 
 from lira.hal.errors import ConfigError
-from lira.hal.messages import CompressedImage, DepthImage, Image
-
-LARGEST_BYTES = 8_000_000  # a picture that is larger, or does not end, is none
-
-Picture = Image | CompressedImage
-
-
-class Source(Protocol):
-    """Something that takes pictures. It is used by one thread, and every call comes back in time."""
-
-    def grab(self, timeout_s: float) -> Picture | DepthImage | None:
-        """Return the newest picture, or depth, with its time of capture on the monotonic clock; None after the time.
-
-        Raises `SensorError` for a picture that cannot be read, `DeviceError` when the source is lost.
-        """
-
-    def close(self) -> None:
-        """Let go of it. May be called twice."""
+from lira.robot.camera.port import Source
 
 
 def open_source(url: str, size: tuple[int, int], openni_folder: Path | None, *, depth: bool = False) -> Source:
@@ -36,7 +18,8 @@ def open_source(url: str, size: tuple[int, int], openni_folder: Path | None, *, 
     except ValueError as error:
         raise ConfigError(f"'{url}' is no address: {error}", "Give the camera's own address.") from error
     if depth and scheme != "openni":
-        raise ConfigError(f"'{url}' has no depth", "Take depth = true out of the settings, or use openni:.")
+        remedy = "Take [depth] out of the profile and depth = true out of the settings, or use openni:."
+        raise ConfigError(f"'{url}' has no depth", remedy)
     if scheme == "openni":
         from lira.robot.camera.astra import OpenniSource
 

@@ -31,6 +31,10 @@ class Readings:
     ranges: dict[str, Range] = field(default_factory=dict)
     buttons: int = 0
 
+    def by_name(self) -> dict[str, Odometry | Imu | BatteryState | Range | None]:
+        """Those that are part of an observation, by the names in the table of sensors."""
+        return {"odom": self.odom, "imu": self.imu, "battery": self.battery, **self.ranges.copy()}
+
 
 class Board:
     """One session with the board. `handle` takes its frames, `calls` gives what it has to be sent."""

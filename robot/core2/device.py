@@ -13,7 +13,7 @@ from lira.robot.core2 import messages
 from lira.robot.core2.board import FIRMWARE, Board, Readings
 from lira.robot.core2.contact import SILENCE_S, Contact, State
 from lira.robot.core2.rosserial import ASK_TOPICS, encode_frame, parse_frames
-from lira.robot.core2.watchdog import Guard
+from lira.robot.core2.watchdog import WatchdogProcess
 from lira.robot.serial_port import Line
 from lira.robot.settings import BaseSettings
 
@@ -66,7 +66,7 @@ class Core2:
         self._power_until_s = -math.inf
         self._motors_told: bool | None = None
         self._answers = False
-        self._guard: Guard | None = None
+        self._guard: WatchdogProcess | None = None
         self._held_until_s = self._sent_s = self._call_s = -math.inf
         self.baud: int | None = None
         self.counts = Counts()
@@ -216,7 +216,7 @@ class Core2:
         """The board is there: `anew` it gets a guard beside it, its watchdog on, and its motors as they shall be."""
         if anew:
             self._dismiss_guard()
-            self._guard = Guard(line.fileno(), self._frame_of(STOP))
+            self._guard = WatchdogProcess(line.fileno(), self._frame_of(STOP))
             self.counts.negotiations += 1
             self._board.forget_calls()
             self._call_s = -math.inf

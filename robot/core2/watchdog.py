@@ -1,8 +1,8 @@
 """A second process on the base's line, which sends zero when the first stops saying that it lives.
 
 What stops a process stops all of its threads: kill -9, a debugger, a full swap, a library that holds the interpreter.
-So a small process (`watchman.py`) shares the open line, and hears a byte with each command. It strikes long before the
-firmware's watchdog does.
+So a small process (`watchdog_process.py`) shares the open line, and hears a byte with each command. It strikes long
+before the firmware's watchdog does.
 """
 
 import contextlib
@@ -18,7 +18,7 @@ ALIVE = b"."
 READ_SIZE = 64
 
 
-class Guard:
+class WatchdogProcess:
     """Watches over this process while it exists. `stop_frame` is what makes the board at `line` stand.
 
     Raises `DeviceError` if it cannot be started.

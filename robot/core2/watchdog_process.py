@@ -1,4 +1,4 @@
-"""The guard's process, a script that needs the standard library alone: `watchman.py LINE EAR STOP_FRAME`.
+"""The guard's process, a script that needs the standard library alone: `watchdog_process.py LINE EAR STOP_FRAME`.
 
 LINE and EAR are open descriptors, the frame is in hexadecimal. As long as bytes come on EAR it does nothing. If they
 stop, or EAR is closed, it sends the frame a few times, and says so; when EAR is closed it ends. It cannot hear what is

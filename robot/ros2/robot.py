@@ -7,7 +7,8 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 
 from lira.hal.bus.bus import Bus, Publisher, Reader
-from lira.hal.bus.topics import BATTERY, CAMERA, CMD_VEL, IMU, ODOM, SCAN, SENSOR, Topic
+from lira.hal.bus.sensors import SENSORS, listened_to, observation_of
+from lira.hal.bus.topics import CMD_VEL, SENSOR, Topic
 from lira.hal.clock import ClockEstimate, is_fresh
 from lira.hal.errors import BusError, ConfigError, DeviceError
 from lira.hal.messages import STOP, Applied, Command, Observation, Reason, Twist, TwistStamped
@@ -15,7 +16,7 @@ from lira.hal.port import DeviceHealth
 from lira.hal.profile import RobotProfile
 from lira.robot.ros2.forms import placed_scan, plain_picture
 
-SENSED: dict[str, Topic[Any]] = {"scan": SCAN, "camera": CAMERA, "odom": ODOM, "imu": IMU, "battery": BATTERY}
+SENSED: dict[str, Topic[Any]] = {sensor.name: sensor.topic for sensor in SENSORS}
 NEEDED = {"scan": "lidar", "camera": "camera"}
 CLOCKS = ("scan", "odom", "imu")  # stamped by the robot's computer; a camera may have a clock of its own
 COMMANDED = "cmd_vel"
@@ -31,7 +32,8 @@ BRIDGE = "Does zenoh-bridge-ros2dds run there and let this topic through? Name i
 class Interface:
     """How the robot's ROS 2 names and types differ from ours, and how its lidar is mounted.
 
-    `topics` gives another topic to any of scan, camera, odom, imu, battery, cmd_vel; `stamped`: it wants TwistStamped.
+    `topics` gives another topic to cmd_vel or a sensor (scan, camera, ... of `hal.bus.sensors`); `stamped`: it wants
+    TwistStamped.
     """
 
     topics: Mapping[str, str] = field(default_factory=dict)
@@ -62,11 +64,13 @@ class Ros2Robot:
         self._profile = profile
         self._bus = bus
         self._interface = interface
-        self._readers: dict[str, Reader[Any]] = {name: bus.reader(interface.topic(name)) for name in SENSED}
+        self._readers: dict[str, Reader[Any]] = {
+            sensor.name: bus.reader(interface.topic(sensor.name)) for sensor in listened_to(profile)
+        }
         self._wheels: Publisher[Any] = bus.publisher(interface.topic(COMMANDED))
         self._newest: dict[str, Any] = {}
+        self._open = False
         self._seq = 0
-        self._observation: Observation | None = None
         self._lock = threading.Lock()  # over the clock and what is sent
         self._clock = ClockEstimate()
         self._silences = 0  # how often a topic that is needed was silent, and came back
@@ -91,25 +95,16 @@ class Ros2Robot:
             stamp = getattr(self._newest.get(name), "stamp_s", None)
             what = f"nothing comes on '{key}'" if stamp is None else f"what comes on '{key}' is stamped {stamp:.1f} s"
             raise DeviceError(what, BRIDGE if stamp is None else "Its driver has to stamp with the robot's own clock.")
+        self._open = True
 
     def read(self) -> Observation:
         """Return the newest of every sensor; what is older than its topic allows is None."""
+        if not self._open:
+            raise DeviceError("the robot is not open", "Call open() first.")
         news = self._listen()
-        now_s = self.now()
-        if self._observation is None or news:
+        if self._seq == 0 or news:
             self._seq += 1
-        newest = self._newest.items()
-        fresh = {name: value for name, value in newest if is_fresh(value.stamp_s, now_s, SENSED[name].max_age_s)}
-        self._observation = Observation(
-            self._seq,
-            now_s,
-            scan=fresh.get("scan"),
-            image=fresh.get("camera"),
-            odom=fresh.get("odom"),
-            imu=fresh.get("imu"),
-            battery=fresh.get("battery"),
-        )
-        return self._observation
+        return observation_of(self._seq, self.now(), self._newest)
 
     def drive(self, command: Command) -> Applied:
         """Send a velocity, at once if it is new, else at 20 Hz."""
@@ -140,6 +135,7 @@ class Ros2Robot:
 
     def close(self) -> None:
         """Send zero. May be called twice."""
+        self._open = False
         with self._lock:
             for _ in range(FAREWELL):
                 try:

@@ -94,10 +94,9 @@ def scan_of(turn: Turn, lidar: Lidar) -> LaserScan | None:
     Of several points in a beam the nearest counts; a beam without one is nan. Ranges after REP-117. The stamp is that
     of the first beam, and `time_increment` is negative where the lidar turns clockwise.
     """
-    full = lidar.fov_rad > math.tau - 1e-3
-    increment_rad = lidar.fov_rad / (lidar.beams if full else max(lidar.beams - 1, 1))
+    increment_rad = lidar.increment_rad
     index = np.rint((turn.bearing_rad + lidar.fov_rad / 2) / increment_rad).astype(np.int64)
-    if full:
+    if lidar.full_turn:
         index %= lidar.beams
     inside = (index >= 0) & (index < lidar.beams)
     if np.count_nonzero(inside) < LEAST_SHARE * lidar.beams:

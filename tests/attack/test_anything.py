@@ -14,12 +14,11 @@ from zenoh.handlers import RingChannel
 
 from lira.hal.bus.attachment import MAGIC
 from lira.hal.bus.bus import Bus
+from lira.hal.bus.services import info_from_json, look_at_estop, release_estop
 from lira.hal.bus.topics import CMD_VEL, ESTOP_LOOK, ESTOP_PRESS, ESTOP_RELEASE, INFO, RESET, TOPICS
 from lira.hal.client.remote import RemoteRobot
 from lira.hal.messages import STOP, Applied, Bool, Clock, Command, LaserScan, Odometry, Twist
 from lira.hal.messages.codec import encode
-from lira.hal.server.estop_service import look_at_estop, release_estop
-from lira.hal.server.info_service import info_from_json
 
 EXAMPLES = 15
 MORE_MB = 80

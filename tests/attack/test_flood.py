@@ -6,8 +6,8 @@ import pytest
 from scene import Scene, kill, moved_on_s
 
 from lira.hal.bus.bus import Bus
+from lira.hal.bus.services import info_from_json
 from lira.hal.bus.topics import CMD_VEL, ESTOP_PRESS, ESTOP_RELEASE, INFO, RESET, TELEOP, TOPICS
-from lira.hal.server.info_service import info_from_json
 
 ROUNDS = 2
 FLOOD_S = 1.5

@@ -9,13 +9,20 @@ from dataclasses import dataclass
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
+import msgspec
+
 from lira.hal.bus.bus import Bus
+from lira.hal.bus.sensors import SENSORS
+from lira.hal.bus.topics import CMD_VEL
 from lira.hal.client.remote import RemoteArena, RemoteRobot
+from lira.hal.messages import Command, CourseState, Episode
+from lira.hal.messages.codec import encode
 from lira.hal.port import Arena, Robot
-from lira.hal.profile import load_profile
+from lira.hal.profile import Depth, load_profile
 from lira.hal.safety.governed import GovernedRobot
 from lira.hal.server.server import HalServer
 from lira.hal.testing import NullRobot
+from lira.robot.ros2.robot import Interface, Ros2Robot
 from lira.robot.rosbot import Devices, Rosbot
 from lira.robot.settings import BaseSettings, LidarSettings, Settings
 from lira.sim_backend.emulators.core2 import Firmware
@@ -23,30 +30,41 @@ from lira.sim_backend.emulators.wired_twin import WiredTwin
 from lira.sim_backend.twin import Twin
 from lira.tools.launch.processes import free_port
 
-PROFILE = load_profile("thesis-sim")
+ROSBOT = load_profile("rosbot2")
+PROFILE = msgspec.structs.replace(  # with every sensor that there is
+    load_profile("thesis-sim"),
+    depth=Depth(width_px=16, height_px=12, range_min_m=0.1, range_max_m=4.0),
+    imu=ROSBOT.imu,
+    battery=ROSBOT.battery,
+    ranger=ROSBOT.ranger,
+)
 
 
 @dataclass(frozen=True)
 class Rig:
-    """An open robot, the truth about it, and how its time passes."""
+    """An open robot, the one that measures for it, the truth about it, and how its time passes."""
 
     robot: Robot
+    source: Robot
     arena: Arena
     real_time: bool = False  # its time passes by itself
     stepped: bool = False  # its time passes with policy's commands only, a period each
+    stamps_s: float = 1e-6  # how far a stamp may be off: far from zero a float does not hold all nanoseconds
 
 
 @contextmanager
-def served(governed: GovernedRobot, arena: Arena, *, lockstep: bool) -> Iterator[Rig]:
+def served(inner: NullRobot | Twin, *, lockstep: bool) -> Iterator[Rig]:
     """Put a robot on a bus of its own, and open it from the other end."""
     name, endpoint, stop = f"t{uuid.uuid4().hex}", f"127.0.0.1:{free_port()}", threading.Event()
     robot_bus, client_bus = Bus(name, listen=endpoint), Bus(name, connect=endpoint)
-    server = threading.Thread(target=HalServer(governed, robot_bus, arena, lockstep=lockstep).run, args=[stop])
+    server = threading.Thread(
+        target=HalServer(GovernedRobot(inner), robot_bus, inner, lockstep=lockstep).run, args=[stop]
+    )
     server.start()
     robot = RemoteRobot(client_bus)
     try:
         robot.open()
-        yield Rig(robot, RemoteArena(robot), real_time=not lockstep, stepped=lockstep)
+        yield Rig(robot, inner, RemoteArena(robot), real_time=not lockstep, stepped=lockstep)
     finally:
         robot.close()
         stop.set()
@@ -61,21 +79,21 @@ def null() -> Iterator[Rig]:
     inner = NullRobot(PROFILE)
     robot = GovernedRobot(inner)
     robot.open()
-    yield Rig(robot, inner)
+    yield Rig(robot, inner, inner)
     robot.close()
 
 
 @contextmanager
 def null_real_time() -> Iterator[Rig]:
     inner = NullRobot(PROFILE, time.monotonic, time.sleep)
-    with served(GovernedRobot(inner), inner, lockstep=False) as rig:
+    with served(inner, lockstep=False) as rig:
         yield rig
 
 
 @contextmanager
 def null_lockstep() -> Iterator[Rig]:
     inner = NullRobot(PROFILE)
-    with served(GovernedRobot(inner), inner, lockstep=True) as rig:
+    with served(inner, lockstep=True) as rig:
         yield rig
 
 
@@ -88,21 +106,21 @@ def twin() -> Iterator[Rig]:
     inner = make_twin()
     robot = GovernedRobot(inner)
     robot.open()
-    yield Rig(robot, inner)
+    yield Rig(robot, inner, inner)
     robot.close()
 
 
 @contextmanager
 def twin_real_time() -> Iterator[Rig]:
     inner = make_twin(1.0)
-    with served(GovernedRobot(inner), inner, lockstep=False) as rig:
+    with served(inner, lockstep=False) as rig:
         yield rig
 
 
 @contextmanager
 def twin_lockstep() -> Iterator[Rig]:
     inner = make_twin()
-    with served(GovernedRobot(inner), inner, lockstep=True) as rig:
+    with served(inner, lockstep=True) as rig:
         yield rig
 
 
@@ -115,23 +133,80 @@ def rosbot_on_emulators() -> Iterator[Rig]:
         folder = Path(name)
         wired = WiredTwin(make_twin(1.0), folder, firmware=Firmware(boot_s=0.05))
         devices = Devices(str(folder / "core2"), str(folder / "rplidar"), wired.url, settings=WIRED)
-        robot = GovernedRobot(Rosbot(PROFILE, devices))
+        # A network camera has no depth.
+        inner = Rosbot(msgspec.structs.replace(PROFILE, depth=None), devices)
+        robot = GovernedRobot(inner)
         try:
             robot.open()
-            yield Rig(robot, wired, real_time=True)
+            yield Rig(robot, inner, wired, real_time=True)
         finally:
             robot.close()
             wired.close()
 
 
+class RosPeer:
+    """A null robot as ROS 2 shows one: messages without anything of ours beside them, and a twist drives it."""
+
+    def __init__(self, inner: NullRobot, bus: Bus) -> None:
+        self._inner, self._bus = inner, bus
+        self._commands = bus.reader(CMD_VEL, depth=16)
+        self._sent: dict[str, float] = {}
+        self._stop = threading.Event()
+        self._thread = threading.Thread(target=self._run)
+        self._thread.start()
+
+    def _run(self) -> None:
+        while not self._stop.wait(0.005):
+            for received in self._commands.poll():
+                self._inner.drive(Command(received.message, self._inner.now()))
+            seen = self._inner.read()
+            for sensor in SENSORS:
+                value = sensor.value(seen)
+                if value is not None and self._sent.get(sensor.name) != value.stamp_s:
+                    self._sent[sensor.name] = value.stamp_s
+                    message = value if sensor.compress is None else sensor.compress(value, PROFILE)
+                    self._bus.put_raw(sensor.topic, encode(message))
+
+    def reset(self, episode: Episode) -> None:
+        """Start afresh, and wait until what its sensors send belongs to the new episode."""
+        self._inner.reset(episode)
+        time.sleep(0.25)
+
+    def state(self) -> CourseState:
+        return self._inner.state()
+
+    def close(self) -> None:
+        self._stop.set()
+        self._thread.join()
+
+
+@contextmanager
+def null_over_ros() -> Iterator[Rig]:
+    name, endpoint = f"t{uuid.uuid4().hex}", f"127.0.0.1:{free_port()}"
+    far, near = Bus(name, listen=endpoint), Bus(name, connect=endpoint)
+    inner = NullRobot(PROFILE, time.monotonic, time.sleep)
+    peer = RosPeer(inner, far)
+    robot = GovernedRobot(Ros2Robot(PROFILE, near, Interface()))
+    try:
+        robot.open()
+        # It estimates the peer's clock from what comes, and takes nothing for later than that.
+        yield Rig(robot, inner, peer, real_time=True, stamps_s=0.05)
+    finally:
+        robot.close()
+        peer.close()
+        assert near.close()
+        assert far.close()
+
+
 # `real_time` and `stepped` robots by name: some promises make no sense for them.
-REAL_TIME = {"null over zenoh", "twin over zenoh", "rosbot on emulators"}
+REAL_TIME = {"null over zenoh", "twin over zenoh", "null over ROS 2", "rosbot on emulators"}
 STEPPED = {"null over zenoh in lockstep", "twin over zenoh in lockstep"}
 
 ROBOTS: dict[str, Callable[[], AbstractContextManager[Rig]]] = {
     "null": null,
     "null over zenoh": null_real_time,
     "null over zenoh in lockstep": null_lockstep,
+    "null over ROS 2": null_over_ros,
     "twin": twin,
     "twin over zenoh": twin_real_time,
     "twin over zenoh in lockstep": twin_lockstep,

@@ -8,12 +8,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from lira.hal.messages import STOP, Applied, Command, Reason, Source, Twist
+from lira.hal.messages import STOP, Applied, Command, Reason, Source, Twist, is_neutral, session_of
 from lira.hal.port import DeviceHealth
 from lira.hal.profile import load_profile
 from lira.hal.safety.governed import GovernedRobot
-from lira.hal.safety.governor import is_neutral
-from lira.hal.safety.lease import session_of
 from lira.hal.testing import NullRobot
 
 ROSBOT = load_profile("rosbot2")

@@ -22,8 +22,8 @@ from lira.hal.messages import (
     TwistStamped,
 )
 from lira.hal.messages.codec import decode, encode, ros_type_of
+from lira.hal.messages.compression import compress
 from lira.hal.messages.ros_table import CODECS, TYPES, definition
-from lira.hal.server.sensor_publisher import compress
 from lira.tools.bench.samples import DECISION, INF, MESSAGES, NAN, of_kind
 
 SCAN = of_kind(LaserScan)[0]

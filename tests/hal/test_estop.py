@@ -2,9 +2,9 @@
 
 from wiring import StuckRobot, joined, real_time_null, remote, served, wait_for
 
+from lira.hal.bus.services import look_at_estop, press_estop, release_estop
 from lira.hal.bus.topics import ESTOP
 from lira.hal.messages import STOP, Bool, Command, Reason, Twist
-from lira.hal.server.estop_service import look_at_estop, press_estop, release_estop
 from lira.hal.testing import NullRobot
 
 GO = Twist(0.5, 0.0)

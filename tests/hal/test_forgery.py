@@ -14,10 +14,10 @@ from lira.hal.bus.access import access_list
 from lira.hal.bus.attachment import Attachment, parse_attachment
 from lira.hal.bus.bus import Bus
 from lira.hal.bus.keys import Role
+from lira.hal.bus.services import look_at_estop, press_estop
 from lira.hal.bus.topics import APPLIED, CMD_VEL, ESTOP_LOOK, ESTOP_PRESS, INFO, SCAN, TELEOP, commander_of, named
 from lira.hal.messages import STOP, Applied, Command, LaserScan, Reason, Source, Twist
 from lira.hal.messages.codec import encode
-from lira.hal.server.estop_service import look_at_estop, press_estop
 
 GO, BACK = Twist(0.5, 0.0), Twist(-0.2, 0.0)
 FORGED_M = 77.0

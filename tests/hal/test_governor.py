@@ -8,11 +8,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from lira.hal.messages import STOP, Command, Reason, Source, Twist
+from lira.hal.messages import STOP, Command, Reason, Source, Twist, is_neutral, session_of
 from lira.hal.profile import STOP_BUDGET_S, load_profile
 from lira.hal.safety.arming import TRANSITIONS, Event, State
-from lira.hal.safety.governor import GRACE_S, Governor, is_neutral
-from lira.hal.safety.lease import session_of
+from lira.hal.safety.governor import GRACE_S, Governor
 
 PROFILE = load_profile("thesis-sim")
 POLICY_S, TELEOP_S = PROFILE.control.policy_timeout_s, PROFILE.control.teleop_timeout_s

@@ -5,8 +5,8 @@ import numpy as np
 import pytest
 
 from lira.hal.errors import SensorError
-from lira.hal.messages import DepthImage, Image
-from lira.hal.server.sensor_publisher import IMAGE_LIMIT_BYTES, compress, compress_depth
+from lira.hal.messages import CompressedImage, DepthImage, Image
+from lira.hal.messages.compression import PICTURE_LIMIT_BYTES, compress, compress_depth, read_depth
 
 RNG = np.random.default_rng(1)
 
@@ -31,7 +31,7 @@ def test_jpeg_keeps_below_the_limit_even_for_noise():
     compressed = compress(Image(1.0, np.full((480, 640, 3), 90, np.uint8)), "jpeg")
     assert compressed.format == "jpeg"
     noise = RNG.integers(0, 256, (240, 320, 3), np.uint8)
-    assert len(compress(Image(1.0, noise), "jpeg").data) <= IMAGE_LIMIT_BYTES
+    assert len(compress(Image(1.0, noise), "jpeg").data) <= PICTURE_LIMIT_BYTES
 
 
 def test_what_is_no_image_is_a_sensor_error():
@@ -43,10 +43,24 @@ def test_a_depth_image_fits_and_no_distance_stays_no_distance():
     noise = np.random.default_rng(0).integers(0, 8000, (480, 640)).astype(np.uint16)
     noise[::2, ::3] = 0
     sent = compress_depth(DepthImage(1.0, noise))
-    assert len(sent.data) <= IMAGE_LIMIT_BYTES
+    assert len(sent.data) <= PICTURE_LIMIT_BYTES
     seen = cv2.imdecode(np.frombuffer(sent.data, np.uint8), cv2.IMREAD_UNCHANGED)
     assert seen.dtype == np.uint16
     assert np.array_equal(seen, noise[:: 480 // seen.shape[0], :: 640 // seen.shape[1]])
     flat = DepthImage(1.0, np.full((480, 640), 1234, np.uint16))
-    seen = cv2.imdecode(np.frombuffer(compress_depth(flat).data, np.uint8), cv2.IMREAD_UNCHANGED)
-    assert np.array_equal(seen, flat.data)
+    seen = read_depth(compress_depth(flat))
+    assert seen.stamp_s == 1.0
+    assert np.array_equal(seen.data, flat.data)
+    assert read_depth(flat) is flat
+
+
+@pytest.mark.parametrize("data", [b"", b"no picture", compress(Image(1.0, np.zeros((8, 8, 3), np.uint8)), "png").data])
+def test_a_picture_without_distances_is_no_depth(data):
+    with pytest.raises(SensorError, match="no depth"):
+        read_depth(CompressedImage(1.0, data, "png"))
+
+
+def test_half_a_depth_is_an_error():
+    whole = compress_depth(DepthImage(1.0, np.zeros((8, 8), np.uint16)))
+    with pytest.raises(SensorError):
+        read_depth(CompressedImage(1.0, whole.data[:-20], "png"))

@@ -10,12 +10,12 @@ import pytest
 from wiring import PROFILE, Served, new_endpoint, real_time_null
 
 from lira.hal.bus.bus import Bus
+from lira.hal.bus.services import REALTIME, Info
 from lira.hal.client.arena import WiredArena
 from lira.hal.client.remote import RemoteRobot
 from lira.hal.errors import BusError
 from lira.hal.messages import STOP, Command, Episode, Reason, Twist
 from lira.hal.server.arena import ArenaLoop
-from lira.hal.server.info_service import REALTIME, Info
 
 APART_S = 5000.0  # between the two clocks
 GO = Twist(0.5, 0.0)

@@ -8,10 +8,13 @@ import numpy as np
 import pytest
 
 from lira.hal.bus.attachment import Attachment
+from lira.hal.bus.boundary import Boundary
 from lira.hal.bus.bus import Received
 from lira.hal.bus.topics import APPLIED, SCAN
-from lira.hal.client.realtime import SILENT_S, RealTimeLink
-from lira.hal.messages import HELD, STOP, Applied, Command, LaserScan, Reason, Source, Twist
+from lira.hal.client.realtime import RealTimeLink
+from lira.hal.clock import SILENT_S
+from lira.hal.messages import HELD, STOP, Applied, Command, LaserScan, Reason, Source, Twist, session_of
+from lira.hal.profile import load_profile
 
 OLD, NEW = 1000.0, 3.0  # what the clocks say
 GO = Twist(0.5, 0.0)
@@ -22,6 +25,7 @@ class FakeBus:
 
     def __init__(self):
         self.epoch, self.queues, self.sent = 99, {}, []
+        self.boundary = Boundary()
         self.began_s = time.monotonic()
 
     def reader(self, topic, depth=1):
@@ -74,7 +78,7 @@ class FakeRobot:
     def _run(self):
         while not self._stop.wait(0.02):
             now_s = self.now()
-            applied = Applied(self._twist, now_s, Source.POLICY, self._reason, epoch=99)
+            applied = Applied(self._twist, now_s, Source.POLICY, self._reason, session=session_of(self._bus.epoch))
             self._bus.say(APPLIED, applied, self._epoch, now_s)
 
     def kill(self):
@@ -89,7 +93,7 @@ def bus():
 
 @pytest.fixture
 def link(bus):
-    link = RealTimeLink(bus, 0.25)
+    link = RealTimeLink(bus, load_profile("thesis-sim"))
     yield link
     link.close()
 

@@ -3,7 +3,7 @@
 import pytest
 from wiring import PROFILE, joined, remote, served, wait_for
 
-from lira.hal.bus.topics import APPLIED, CMD_VEL, LOCKSTEP
+from lira.hal.bus.topics import APPLIED, CMD_VEL, IN_LOCKSTEP
 from lira.hal.client.remote import RemoteArena, RemoteRobot
 from lira.hal.errors import BusError
 from lira.hal.messages import STOP, Command, Episode, Reason, Source, Twist
@@ -95,7 +95,7 @@ def test_commands_for_other_observations_are_not_obeyed(robot):
         policy(client, STOP)
         go_on(client)
         seq = client.read().seq
-        stranger, applied = bus.publisher(CMD_VEL, LOCKSTEP), bus.reader(APPLIED)
+        stranger, applied = bus.publisher(CMD_VEL, IN_LOCKSTEP), bus.reader(APPLIED)
         wait_for(lambda: stranger.matching)
         for answers in (seq - 1, seq + 1, -1):
             stranger.put(GO, client.now(), answers=answers)

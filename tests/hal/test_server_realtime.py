@@ -2,10 +2,8 @@
 
 import threading
 import time
-from dataclasses import replace
 
-import cv2
-import numpy as np
+import msgspec
 import pytest
 import zenoh
 from wiring import PROFILE, StuckRobot, joined, new_endpoint, new_name, real_time_null, remote, served, wait_for
@@ -15,9 +13,10 @@ from lira.hal.bus.topics import APPLIED, CMD_VEL, DEPTH
 from lira.hal.client.realtime import DECISION_S
 from lira.hal.client.remote import RemoteArena, RemoteRobot
 from lira.hal.errors import BusError, DeviceError
-from lira.hal.messages import STOP, Applied, Command, DepthImage, Episode, Reason, Source, Twist
+from lira.hal.messages import STOP, Applied, Command, Episode, Reason, Source, Twist
 from lira.hal.messages.codec import encode
-from lira.hal.profile import STOP_BUDGET_S
+from lira.hal.messages.compression import read_depth
+from lira.hal.profile import STOP_BUDGET_S, Depth
 from lira.hal.safety.governed import GovernedRobot
 from lira.hal.server.server import HalServer
 from lira.hal.testing import NullRobot
@@ -220,22 +219,15 @@ def test_the_profile_comes_over_the_bus():
         assert client.profile == PROFILE
 
 
-class Deep(NullRobot):
-    """A null robot whose camera sees a wall at 1.5 m, too."""
-
-    def read(self):
-        seen = super().read()
-        return replace(seen, depth=DepthImage(seen.stamp_s, np.full((12, 16), 1500, np.uint16)))
+DEEP = msgspec.structs.replace(PROFILE, depth=Depth(width_px=16, height_px=12, range_min_m=0.1, range_max_m=4.0))
 
 
 def test_depth_travels_at_its_own_rate_and_only_to_who_asks():
-    with served(real_time_null(Deep)) as robot, joined(robot) as bus:
+    with served(NullRobot(DEEP, time.monotonic, time.sleep)) as robot, joined(robot) as bus:
         reader = bus.reader(DEPTH, depth=64)
         wait_for(lambda: reader.newest() is not None)
         reader.poll()
         time.sleep(1.0)
         came = reader.poll()
         assert 3 <= len(came) <= 6
-        pixels = cv2.imdecode(np.frombuffer(came[-1].message.data, np.uint8), cv2.IMREAD_UNCHANGED)
-        assert pixels.dtype == np.uint16
-        assert np.unique(pixels).tolist() == [1500]
+        assert read_depth(came[-1].message).data.shape == (12, 16)

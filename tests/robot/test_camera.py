@@ -13,8 +13,9 @@ from hypothesis import strategies as st
 
 from lira.hal.errors import ConfigError, DeviceError, SensorError
 from lira.hal.messages import CompressedImage, DepthImage, Image
+from lira.hal.messages.compression import PICTURE_LIMIT_BYTES
 from lira.hal.profile import load_profile
-from lira.robot.camera.device import LIMIT_BYTES, CameraDevice, shrink
+from lira.robot.camera.device import CameraDevice, shrink
 from lira.robot.camera.mjpeg import parse_parts
 from lira.robot.camera.source import open_source
 from lira.robot.camera.video import VideoSource
@@ -129,9 +130,9 @@ def test_noise_in_a_stream_is_no_error(data):
 
 def test_a_picture_too_large_to_travel_is_encoded_again():
     large = jpeg(0, (640, 480), noise=1.0)
-    assert len(large) > LIMIT_BYTES
+    assert len(large) > PICTURE_LIMIT_BYTES
     small = shrink(CompressedImage(1.0, large))
-    assert len(small.data) <= LIMIT_BYTES
+    assert len(small.data) <= PICTURE_LIMIT_BYTES
     assert cv2.imdecode(np.frombuffer(small.data, np.uint8), cv2.IMREAD_COLOR).shape == (480, 640, 3)
     assert shrink(CompressedImage(1.0, jpeg(5))).data == jpeg(5)
 

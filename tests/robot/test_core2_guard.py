@@ -10,7 +10,7 @@ import pytest
 from lira.hal.errors import DeviceError
 from lira.hal.messages import STOP, Odometry, Twist
 from lira.robot.core2.device import Core2
-from lira.robot.core2.watchdog import Guard
+from lira.robot.core2.watchdog import WatchdogProcess
 from lira.robot.settings import BaseSettings
 from lira.robot.supervisor import Keeper
 from lira.sim_backend.emulators.core2 import WATCHDOG_S, Core2Unit, Firmware
@@ -139,7 +139,7 @@ def test_who_was_thawed_counts_a_loss_and_stands_for_a_moment(board, tmp_path, m
 
 def test_nobody_drives_without_a_guard(tmp_path):
     with (tmp_path / "line").open("wb") as line:
-        guard = Guard(line.fileno(), b"\x01")
+        guard = WatchdogProcess(line.fileno(), b"\x01")
         assert guard.tell() is False
         guard._process.kill()
         guard._process.wait()

@@ -7,6 +7,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from lira.hal.bus.boundary import Boundary
 from lira.hal.bus.bus import Received
 from lira.hal.errors import DeviceError
 from lira.hal.messages import STOP, Command, CompressedImage, LaserScan, Odometry, Reason, Twist
@@ -179,7 +180,7 @@ class FarBus:
     """The other robot's topics, put by hand."""
 
     def __init__(self):
-        self.queues, self.sent = {}, []
+        self.queues, self.sent, self.boundary = {}, [], Boundary()
 
     def reader(self, topic):
         queue = self.queues.setdefault(topic.key, [])
@@ -194,20 +195,25 @@ class Far:
 
     def __init__(self, monkeypatch):
         self.local_s = 50.0
-        monkeypatch.setattr("lira.robot.ros2.robot.time", SimpleNamespace(monotonic=lambda: self.local_s))
+        clock = SimpleNamespace(monotonic=lambda: self.local_s, sleep=lambda _: None)
+        monkeypatch.setattr("lira.robot.ros2.robot.time", clock)
         self.bus = FarBus()
         self.robot = Ros2Robot(PROFILE, self.bus, Interface())
-        self.show()
+        self.send()
+        self.robot.open()
 
     def put(self, key, message):
         self.bus.queues[key].append(Received(message, None, self.local_s))
 
     def show(self, camera_ahead_s=0.0):
+        self.send(camera_ahead_s)
+        self.robot.read()
+
+    def send(self, camera_ahead_s=0.0):
         now_s = self.local_s + 1000.0
         self.put("odom", Odometry(now_s, 0.0, 0.0, 0.0, 0.0, 0.0))
         self.put("scan", replace(SCAN, stamp_s=now_s))
         self.put("camera/color/image_raw/compressed", CompressedImage(now_s + camera_ahead_s, b"\xff\xd8"))
-        self.robot.read()
 
 
 def test_a_silence_of_a_ros_2_robot_is_a_loss_also_when_nobody_looked(monkeypatch):

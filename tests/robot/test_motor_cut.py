@@ -5,12 +5,12 @@ import time
 from contextlib import contextmanager
 
 from lira.hal.bus.bus import Bus
+from lira.hal.bus.services import press_estop, release_estop
 from lira.hal.bus.topics import ESTOP
 from lira.hal.client.remote import RemoteRobot
 from lira.hal.messages import STOP, Bool, Command, Odometry, Reason, Twist
 from lira.hal.profile import load_profile
 from lira.hal.safety.governed import GovernedRobot
-from lira.hal.server.estop_service import press_estop, release_estop
 from lira.hal.server.server import HalServer
 from lira.robot.core2.config_calls import AGAIN_S, Errands
 from lira.robot.rosbot import Devices, Rosbot

@@ -2,11 +2,12 @@ import math
 import time
 from contextlib import contextmanager
 
+import msgspec
 import pytest
 
 from lira.hal.errors import ConfigError, DeviceError
 from lira.hal.messages import STOP, Command, Reason, Twist
-from lira.hal.profile import load_profile
+from lira.hal.profile import Depth, load_profile
 from lira.hal.safety.governed import GovernedRobot
 from lira.robot.rosbot import Devices, Rosbot
 from lira.robot.settings import BaseSettings, LidarSettings, Settings, load_settings
@@ -201,6 +202,14 @@ def test_lidar_and_base_swapped_are_told_apart(tmp_path):
         with pytest.raises(DeviceError, match=r"no base board answers|is no CORE2|no lidar answers|is no RPLIDAR"):
             robot.open()
         assert not bench.base.crashed
+
+
+def test_a_profile_with_depth_needs_a_camera_that_has_it(tmp_path):
+    deep = msgspec.structs.replace(PROFILE, depth=Depth(width_px=16, height_px=12, range_min_m=0.1, range_max_m=4.0))
+    with wired(tmp_path) as bench:
+        devices = Devices(str(tmp_path / "core2"), str(tmp_path / "rplidar"), bench.url, settings=QUICK)
+        with pytest.raises(ConfigError, match=r"has no depth.*profile"):
+            Rosbot(deep, devices).open()
 
 
 def test_nothing_not_finite_reaches_the_base(tmp_path):

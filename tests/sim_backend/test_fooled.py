@@ -37,8 +37,8 @@ def look():
         sensors = opened[key]
         sensors.forget()
         motion = drive.motion(*pose)
-        image = to_uint8(gray_image(sensors.image(motion, 0.0), profile.features.image_px)).astype(int)
-        scan, _ = bin_scan(sensors.scan(motion, 0.0), profile.features)
+        image = to_uint8(gray_image(sensors.read("camera", motion, 0.0), profile.features.image_px)).astype(int)
+        scan, _ = bin_scan(sensors.read("scan", motion, 0.0), profile.features)
         return image, scan
 
     yield look

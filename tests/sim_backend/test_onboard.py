@@ -41,9 +41,14 @@ def at(x=0.0, y=0.0, yaw=0.0, linear=0.0, angular=0.0):
     return drive.motion(x, y, yaw, linear, angular)
 
 
+def near(sensors):
+    """What the rangers read."""
+    return {name: value.range_m for name, value in sensors.newest(at(), 0.0).items() if name.startswith("range")}
+
+
 def test_depth_is_the_distance_along_the_axis_in_millimetres(sensors):
     wall = Box(x_m=2.5, y_m=0.0, length_m=1.0, width_m=8.0, height_m=4.0)
-    depth = sensors(wall).depth(at(), 0.0)
+    depth = sensors(wall).read("depth", at(), 0.0)
     assert depth.data.shape == (48, 64)
     assert depth.data.dtype == np.uint16
     eye_m = 2.0 - ROSBOT.camera.x_m
@@ -52,7 +57,7 @@ def test_depth_is_the_distance_along_the_axis_in_millimetres(sensors):
 
 
 def test_depth_sees_the_floor_and_nothing_in_the_sky(sensors):
-    data = sensors().depth(at(), 0.0).data
+    data = sensors().read("depth", at(), 0.0).data
     assert (data[:24] == 0).all()
     rows = np.nonzero(data[:, 32])[0]
     camera = ROSBOT.camera
@@ -63,19 +68,19 @@ def test_depth_sees_the_floor_and_nothing_in_the_sky(sensors):
 def test_depth_beyond_its_ranges_is_zero(sensors):
     profile = msgspec.structs.replace(ROSBOT, depth=msgspec.structs.replace(DEPTH, range_max_m=1.0))
     wall = Box(x_m=2.5, y_m=0.0, length_m=1.0, width_m=8.0, height_m=4.0)
-    assert sensors(wall, profile=profile).depth(at(), 0.0).data[10:24].max() == 0
+    assert sensors(wall, profile=profile).read("depth", at(), 0.0).data[10:24].max() == 0
 
 
 def test_rangers_tell_what_is_beside_their_corner(sensors):
     block = Box(x_m=0.5, y_m=0.2, length_m=0.2, width_m=0.2, height_m=0.5)
-    seen = {value.frame_id: value.range_m for value in sensors(block).ranges(at(), 0.0)}
+    seen = near(sensors(block))
     assert seen["range_fl"] == pytest.approx(0.31, abs=0.03)
     assert seen["range_rl"] == seen["range_rr"] == math.inf
 
 
 def test_a_ranger_that_touches_something_says_too_close(sensors):
     block = Box(x_m=0.2, y_m=0.05, length_m=0.18, width_m=0.2, height_m=0.5)
-    seen = {value.frame_id: value.range_m for value in sensors(block).ranges(at(), 0.0)}
+    seen = near(sensors(block))
     assert seen["range_fl"] == -math.inf
 
 

@@ -7,9 +7,10 @@ import pytest
 
 from lira.hal.errors import ConfigError
 from lira.hal.messages import CompressedImage
+from lira.hal.messages.compression import PICTURE_LIMIT_BYTES, fit_jpeg
 from lira.hal.profile import load_profile
 from lira.sim_backend import drive
-from lira.sim_backend.camera import encode_jpeg, projection_matrix, view_matrix
+from lira.sim_backend.camera import projection_matrix, view_matrix
 from lira.sim_backend.layout import build
 from lira.sim_backend.lidar import beam_angles
 from lira.sim_backend.scene import Scene
@@ -44,12 +45,12 @@ def sensors():
 
 def picture(sensors, x=0.0, y=0.0, yaw=0.0):
     sensors.forget()
-    return sensors.image(drive.motion(x, y, yaw), 0.0).data
+    return sensors.read("camera", drive.motion(x, y, yaw), 0.0).data
 
 
 def ranges(sensors, x=0.0, y=0.0, yaw=0.0):
     sensors.forget()
-    return sensors.scan(drive.motion(x, y, yaw), 0.0).ranges
+    return sensors.read("scan", drive.motion(x, y, yaw), 0.0).ranges
 
 
 # Camera
@@ -158,12 +159,12 @@ def test_the_view_puts_what_is_ahead_in_the_middle():
 def test_jpeg_stays_below_what_fits_on_the_link():
     noise = np.random.default_rng(0).integers(0, 256, (480, 640)).astype(np.uint8)
     flat = np.full((480, 640), 100, np.uint8)
-    assert len(encode_jpeg(noise)) < 64_000
-    assert len(encode_jpeg(flat)) < len(encode_jpeg(noise))
+    assert len(fit_jpeg(noise)) <= PICTURE_LIMIT_BYTES
+    assert len(fit_jpeg(flat)) < len(fit_jpeg(noise))
 
 
 def test_the_rosbots_camera_travels_as_jpeg(sensors):
-    image = sensors(floor(line=ROAD), ROSBOT).image(drive.motion(0, 0, 0), 0.0)
+    image = sensors(floor(line=ROAD), ROSBOT).read("camera", drive.motion(0, 0, 0), 0.0)
     assert isinstance(image, CompressedImage)
     assert len(image.data) < 64_000
     decoded = cv2.imdecode(np.frombuffer(image.data, np.uint8), cv2.IMREAD_COLOR)
@@ -219,7 +220,7 @@ def test_another_layout_shows_its_own_boxes_and_none_of_the_last(sensors):
 
 
 def test_ranges_are_the_geometrys_within_millimetres(sensors):
-    scan = sensors(floor(Box(x_m=2.0, y_m=0.0, width_m=1.0))).scan(drive.motion(0.2, 0.0, 0.0), 0.0)
+    scan = sensors(floor(Box(x_m=2.0, y_m=0.0, width_m=1.0))).read("scan", drive.motion(0.2, 0.0, 0.0), 0.0)
     angles = scan.angle_min + scan.angle_increment * np.arange(len(scan.ranges))
     hit = np.abs(np.tan(angles) * (1.775 - 0.2)) < 0.499
     assert scan.ranges[hit] == pytest.approx((1.775 - 0.2) / np.cos(angles[hit]), abs=1e-3)
@@ -233,7 +234,7 @@ def test_beams_run_counter_clockwise(sensors):
 
 
 def test_the_sector_includes_both_of_its_ends():
-    angles, increment = beam_angles(SIM.lidar)
+    angles, increment = beam_angles(SIM.lidar), SIM.lidar.increment_rad
     assert len(angles) == 101
     assert (angles[0], angles[-1]) == pytest.approx((-SIM.lidar.fov_rad / 2, SIM.lidar.fov_rad / 2))
     assert math.degrees(increment) == pytest.approx(1.3, abs=1e-4)
@@ -241,7 +242,7 @@ def test_the_sector_includes_both_of_its_ends():
 
 
 def test_a_full_turn_has_no_beam_twice():
-    angles, increment = beam_angles(ROSBOT.lidar)
+    angles, increment = beam_angles(ROSBOT.lidar), ROSBOT.lidar.increment_rad
     assert angles[0] == pytest.approx(-math.pi)
     assert angles[-1] + increment == pytest.approx(math.pi)
 
@@ -270,7 +271,7 @@ def test_noise_and_dropout_have_their_size_and_their_seed(sensors):
     wall = floor(Box(x_m=2.0, y_m=0.0, length_m=0.1, width_m=30.0))
     clean = ranges(sensors(wall))
     first, again, other = (
-        np.array([sensors_.scan(drive.motion(0, 0, 0), t).ranges for t in range(20)])
+        np.array([sensors_.read("scan", drive.motion(0, 0, 0), t).ranges for t in range(20)])
         for sensors_ in (sensors(wall, spoiled, seed=s) for s in (1, 1, 2))
     )
     assert np.array_equal(first, again, equal_nan=True)

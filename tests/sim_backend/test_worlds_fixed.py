@@ -30,6 +30,6 @@ def test_the_camera_sees_what_it_always_saw():
     pictures = []
     for pose in ((0.0, 0.0, 0.0), (3.0, 0.2, 0.3), (8.0, -0.3, -0.2)):
         sensors.forget()
-        pictures.append(sensors.image(drive.motion(*pose), 0.0).data)
+        pictures.append(sensors.read("camera", drive.motion(*pose), 0.0).data)
     sensors.close()
     assert digest(np.stack(pictures).tobytes()) == PICTURE_HASH

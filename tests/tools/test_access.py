@@ -10,13 +10,12 @@ from zenoh import ext
 from lira.hal.bus.attachment import Attachment, parse_attachment
 from lira.hal.bus.bus import Bus
 from lira.hal.bus.keys import load_keys
+from lira.hal.bus.services import info_from_json, look_at_estop, press_estop, release_estop
 from lira.hal.bus.topics import BATTERY, ESTOP_LOOK, ESTOP_PRESS, ESTOP_RELEASE, INFO, RESET
 from lira.hal.client.remote import RemoteRobot
 from lira.hal.errors import BusError, ConfigError
 from lira.hal.messages import STOP, BatteryState, Command, Reason, Twist
 from lira.hal.messages.codec import encode
-from lira.hal.server.estop_service import look_at_estop, press_estop, release_estop
-from lira.hal.server.info_service import info_from_json
 from lira.tools.launch.processes import free_port
 
 

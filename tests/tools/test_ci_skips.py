@@ -1,4 +1,5 @@
 import os
+import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -24,6 +25,7 @@ def run_pytest(folder, *, ci):
 @pytest.mark.parametrize("how", TESTS)
 def test_an_unexpected_skip_fails_in_ci_and_only_there(tmp_path, how):
     (tmp_path / "conftest.py").write_text(CONFTEST.read_text())
+    shutil.copy(CONFTEST.with_name("kinds.py"), tmp_path)
     (tmp_path / "test_it.py").write_text(TESTS[how])
     assert run_pytest(tmp_path, ci=False).returncode in (0, 5)
     done = run_pytest(tmp_path, ci=True)
@@ -32,6 +34,7 @@ def test_an_unexpected_skip_fails_in_ci_and_only_there(tmp_path, how):
 
 
 def test_an_expected_skip_and_an_expected_failure_pass_in_ci(tmp_path):
+    shutil.copy(CONFTEST.with_name("kinds.py"), tmp_path)
     (tmp_path / "conftest.py").write_text(CONFTEST.read_text() + "\n\nEXPECTED_SKIPS = {'no robot here'}\n")
     xfail = "@pytest.mark.xfail(reason='known')\ndef test_other(): assert False\n"
     (tmp_path / "test_it.py").write_text(TESTS["a test that skips"] + xfail)

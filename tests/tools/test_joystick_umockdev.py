@@ -12,11 +12,11 @@ import pytest
 from pad_bed import SONY, Bed, library
 
 from lira.hal.bus.bus import Bus
+from lira.hal.bus.services import look_at_estop
 from lira.hal.bus.topics import APPLIED, JOY, OPERATOR, TELEOP
 from lira.hal.messages import STOP, OperatorRequest, Reason, Request, Source
 from lira.hal.profile import load_profile
 from lira.hal.safety.governed import GovernedRobot
-from lira.hal.server.estop_service import look_at_estop
 from lira.hal.server.server import HalServer
 from lira.hal.testing import NullRobot
 from lira.tools.launch.processes import ChildProcess, free_port, lira_command

@@ -9,12 +9,12 @@ from keyed_bed import GO, NAME, drive_until, make_keys, plain_session, serving, 
 
 from lira.hal.bus.bus import Bus
 from lira.hal.bus.keys import KEY, ROLES, load_keys
+from lira.hal.bus.services import look_at_estop, press_estop
 from lira.hal.bus.topics import APPLIED, CMD_VEL, DIAGNOSTICS, JOY, OPERATOR, SIM_STATE
 from lira.hal.client.remote import RemoteRobot
 from lira.hal.errors import BusError, ConfigError
 from lira.hal.messages import STOP, Joy, OperatorRequest, Reason, Request
 from lira.hal.messages.codec import encode
-from lira.hal.server.estop_service import look_at_estop, press_estop
 from lira.tools.authority import init
 from lira.tools.cli import main
 from lira.tools.launch.processes import ChildProcess, free_port, lira_command

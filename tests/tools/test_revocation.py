@@ -9,10 +9,10 @@ from keyed_bed import GO, NAME, drive_until, make_keys, serving, wait_for
 
 from lira.hal.bus.bus import Bus
 from lira.hal.bus.keys import CA, CERTIFICATE, KEY, ROLES, load_keys
+from lira.hal.bus.services import look_at_estop
 from lira.hal.client.remote import RemoteRobot
 from lira.hal.errors import BusError
 from lira.hal.messages import STOP, Command, Reason
-from lira.hal.server.estop_service import look_at_estop
 from lira.tools.authority import enroll, enrolled, renew
 from lira.tools.cli import main
 from lira.tools.launch.processes import free_port

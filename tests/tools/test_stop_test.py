@@ -435,7 +435,7 @@ CI = (
     "disk full under labels and record",
     "link's process frozen (SIGSTOP)",
     "robot's process frozen (SIGSTOP)",
-    "base's driver hangs",
+    "robot's governor hangs",
     "board hears no more",
     "put without a certificate",
 )

@@ -12,6 +12,7 @@ from lira.hal.messages import (
     CompressedImage,
     CourseState,
     Decision,
+    DepthImage,
     DiagnosticArray,
     DiagnosticStatus,
     ExpertView,
@@ -31,7 +32,7 @@ from lira.hal.messages import (
     Twist,
     TwistStamped,
 )
-from lira.hal.server.sensor_publisher import compress
+from lira.hal.messages.compression import compress, compress_depth
 
 NAN, INF = math.nan, math.inf
 
@@ -52,6 +53,7 @@ MESSAGES: list[object] = [
     Image(1.0, np.arange(6, dtype=np.uint8).reshape(2, 3), "mono8"),
     CompressedImage(1.0, b"\xff\xd8 not really \xff\xd9", "jpeg"),
     compress(Image(1.0, np.arange(48, dtype=np.uint8).reshape(4, 4, 3)), "png"),
+    compress_depth(DepthImage(1.0, np.arange(16, dtype=np.uint16).reshape(4, 4))),
     Odometry(1.5, 1.0, -2.0, 0.75, 0.5, -0.25),
     Imu(1.5, -0.75, 0.5, 9.0, -9.0),
     Range(1.5, "range_fl", 0.5, 0.03125, 0.875),

@@ -17,10 +17,10 @@ from tempfile import TemporaryDirectory
 import msgspec
 
 from lira.hal.bus.bus import Bus
+from lira.hal.bus.services import press_estop, release_estop
 from lira.hal.bus.topics import APPLIED, RESET
 from lira.hal.errors import ConfigError
 from lira.hal.messages import STOP, Episode, Source
-from lira.hal.server.estop_service import press_estop, release_estop
 from lira.tools.bench import Row, watcher
 from lira.tools.launch.processes import ChildProcess, free_port, lira_command
 from lira.tools.stop_test import hand

@@ -7,8 +7,8 @@ import sys
 import time
 
 from lira.hal.bus.bus import Bus
+from lira.hal.bus.services import info_from_json
 from lira.hal.bus.topics import INFO
-from lira.hal.server.info_service import info_from_json
 from lira.tools.console.listen import Ears
 
 READY = "watching"

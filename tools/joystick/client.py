@@ -7,6 +7,7 @@ import threading
 from collections.abc import Callable
 
 from lira.hal.bus.bus import Bus
+from lira.hal.bus.services import LOCKSTEP, info_from_json, press_estop, release_estop
 from lira.hal.bus.topics import APPLIED, DECISION, ESTOP, INFO, JOY, JOY_FEEDBACK, OPERATOR, OPERATOR_ANSWER, TELEOP
 from lira.hal.clock import ClockEstimate
 from lira.hal.errors import BusError
@@ -23,8 +24,6 @@ from lira.hal.messages import (
     Twist,
 )
 from lira.hal.profile import RobotProfile
-from lira.hal.server.estop_service import press_estop, release_estop
-from lira.hal.server.info_service import LOCKSTEP, info_from_json
 
 DEPTH = 16
 ANSWER_S = 2.0  # after that nobody will answer a request

@@ -11,7 +11,6 @@ from lira.hal.errors import ConfigError
 from lira.tools.joystick.codes import AXES, BUTTONS
 
 Share = Annotated[float, Meta(ge=0.0, le=1.0)]
-DEFAULT_PAD = "ps3"
 
 
 class Axis(Table, frozen=True):

@@ -5,14 +5,13 @@ from dataclasses import dataclass, field
 from typing import Any, Generic, TypeVar
 
 from lira.hal.bus.bus import Bus, Reader
+from lira.hal.bus.sensors import Stamped
+from lira.hal.bus.services import LOCKSTEP, info_from_json
 from lira.hal.bus.topics import APPLIED, CAMERA, CMD_VEL, IMU, INFO, ODOM, SCAN
-from lira.hal.client.sensor_reader import Stamped
 from lira.hal.clock import ClockEstimate
 from lira.hal.errors import BusError, ConfigError
-from lira.hal.messages import STOP, Applied, CompressedImage, Imu, LaserScan, Odometry, Reason, Source
+from lira.hal.messages import STOP, Applied, CompressedImage, Imu, LaserScan, Odometry, Reason, Source, session_of
 from lira.hal.profile import RobotProfile
-from lira.hal.safety.lease import session_of
-from lira.hal.server.info_service import LOCKSTEP, info_from_json
 from lira.tools.parity.script import Phase, motions
 
 S = TypeVar("S", bound=Stamped)

@@ -39,8 +39,3 @@ def motions(base: Base) -> tuple[Phase, ...]:
     for name, twist in steps.items():
         script += [Phase(name, twist, STEP_S), Phase(f"{name} stop", STOP, REST_S)]
     return tuple(script)
-
-
-def script_of(base: Base) -> dict[str, Phase]:
-    """Return the script by the names of its phases."""
-    return {phase.name: phase for phase in motions(base)}

@@ -8,8 +8,8 @@ from pathlib import Path
 from typing import Protocol
 
 from lira.hal.bus.bus import Bus
+from lira.hal.bus.services import press_estop, release_estop
 from lira.hal.errors import LiraError
-from lira.hal.server.estop_service import press_estop, release_estop
 from lira.tools.launch.link_fault import LinkFaults, Relay
 from lira.tools.launch.processes import ChildProcess
 from lira.tools.stop_test.intruder import Intruder

@@ -8,6 +8,8 @@ from lira.tools.stop_test.mutants import Mutant
 from lira.tools.stop_test.rows import ROWS, Row
 from lira.tools.stop_test.verdict import Result
 
+FAILED = "failed"
+
 
 def cull(
     mutants: Sequence[Mutant],
@@ -47,9 +49,6 @@ def judge_mutant(mutant: Mutant, sound: dict[str, str], broken: dict[str, str]) 
         "caught": not why,
         "why": "; ".join(why) or "all of its rows failed",
     }
-
-
-FAILED = "failed"
 
 
 def _passed(matrix: Matrix, rows: Sequence[Row], say: Callable[[Result], None]) -> dict[str, str]:

@@ -16,11 +16,11 @@ import zenoh
 from lira.hal.bus.attachment import Attachment
 from lira.hal.bus.bus import Bus, Received
 from lira.hal.bus.keys import load_keys
+from lira.hal.bus.services import look_at_estop, release_estop
 from lira.hal.bus.topics import APPLIED, CMD_VEL, TELEOP
 from lira.hal.errors import BusError
 from lira.hal.messages import STOP, Applied, Twist
 from lira.hal.messages.codec import encode
-from lira.hal.server.estop_service import look_at_estop, release_estop
 from lira.tools.stop_test import flood
 from lira.tools.stop_test.sender import Pen
 

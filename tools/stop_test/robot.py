@@ -18,10 +18,10 @@ import numpy as np
 from lira.hal.bus.access_log import count_refusals
 from lira.hal.bus.bus import Bus
 from lira.hal.messages import Applied, Command, Image, LaserScan, Observation
+from lira.hal.messages.compression import compress
 from lira.hal.port import Robot
 from lira.hal.profile import RobotProfile, load_profile
 from lira.hal.safety.governed import GovernedRobot
-from lira.hal.server.sensor_publisher import compress
 from lira.hal.server.server import HalServer, stop_on_signal
 from lira.robot.rosbot import Devices, Rosbot
 from lira.sim_backend.twin import Twin

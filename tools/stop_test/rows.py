@@ -128,7 +128,7 @@ def flooded(kind: str, setup: Setup = TWIN, *, quick: bool = False) -> Row:
     where = "" if setup is TWIN else f" on {setup.name}"
     return Row(
         f"flood of {kind}{where}",
-        one_by_one(flood(kind), pause(1.0), KILL),
+        one_by_one(INSIST, flood(kind), pause(1.0), KILL),
         acts.rest,
         hold_s=1.5,
         stopped_by=(WATCHDOG, REFUSAL, BASE, GUARD),
@@ -164,11 +164,9 @@ ROWS = (
     Row("stamps half a second ahead", driver_does("half a second ahead"), hold_s=1.2, refusal=("from the future",)),
     Row("stamps an hour behind", driver_does("an hour behind"), hold_s=1.2, refusal=("late", "out of order"), trials=1),
     # Others who command.
-    Row("second commander", acts.rival, silence=True, refusal=("another commander",),
-        quick=True),
+    Row("second commander", acts.rival, silence=True, refusal=("another commander",), quick=True),
     Row("commander with an old epoch", acts.lose_the_lease, THAW, hold_s=1.5, refusal=("old epoch",), fatal=True),
-    Row("commands forged with an old time", acts.forge(-1.0), silence=True,
-        refusal=FORGED),
+    Row("commands forged with an old time", acts.forge(-1.0), silence=True, refusal=FORGED),
     Row("commands recorded and replayed", acts.replay, THAW, refusal=("late", "out of order", *FORGED)),
     Row("lease copied", acts.forge(0.0), silence=True, refusal=FORGED, quick=True),
     Row("emergency stop beside an idle ROS joystick", acts.press,
@@ -196,7 +194,7 @@ ROWS = (
         resumes=True),
     Row("robot's main thread hangs", robot_does("main hangs"), silence=True, hold_s=2.0, trials=1),
     # The learner.
-    Row("lira fusion killed (kill -9)", KILL, drives=LIRA, setup=FUSION, trials=1, quick=True),
+    Row("lira fusion killed (kill -9)", KILL, drives=LIRA, setup=FUSION, trials=1),
     Row("lira fusion frozen (SIGSTOP)", FREEZE, THAW, hold_s=1.6, drives=LIRA, setup=FUSION, trials=1),
     Row("robot restarted under the learner", acts.end_robot, acts.restart_robot, drives=LIRA, setup=LEARNER,
         stopped_by=(WATCHDOG, FAREWELL), trials=1),
@@ -240,8 +238,7 @@ ROWS = (
     clock_set("driver", HOUR_S, "ahead"),
     clock_set("driver", -HOUR_S, "behind"),
     # Keys.
-    Row("put without a certificate", acts.put_plainly, silence=True, refusal=("links",),
-        setup=KEYED),
+    Row("put without a certificate", acts.put_plainly, silence=True, refusal=("links",), setup=KEYED),
     Row("put with a viewer's certificate", acts.put_as(GUEST), silence=True,
         refusal=("messages",), setup=KEYED),
     Row("emergency stop released by a viewer", one_by_one(acts.press, driver_does("waver")), acts.release_as(GUEST),

@@ -4,14 +4,14 @@ The mark is an angular velocity of at most 1 mrad/s, different for each command 
 included. No limit of a profile touches it, and a zero stays a zero.
 """
 
+import os
 import time
 from pathlib import Path
 from typing import Any
 
 from lira.hal.bus.bus import Bus, Publisher
 from lira.hal.bus.topics import CMD_VEL, TELEOP
-from lira.hal.messages import Twist
-from lira.hal.safety.governor import is_neutral
+from lira.hal.messages import Twist, is_neutral
 from lira.tools.stop_test.journal import SENDERS, JournalWriter, Sent
 
 SENDER_RAD_S, TICK_RAD_S = 1e-4, 1e-13
@@ -19,10 +19,13 @@ TICK_S, TICKS = 1e-6, 10**9  # marks return after 1,000 s, long after their jour
 
 
 class Pen:
-    """Marks what one sender sends, and notes it in its own file of the journal in `folder`."""
+    """Marks what one sender sends, and notes it in the journal in `folder`.
+
+    In a file that is as young as the process: a full disk, which is a limit on any file, does not stop the notes.
+    """
 
     def __init__(self, folder: Path, who: str) -> None:
-        self._journal = JournalWriter(folder, who)
+        self._journal = JournalWriter(folder, f"{who}-{os.getpid()}")
         self._who = who
         self._mark_rad_s = (1 + SENDERS.index(who)) * SENDER_RAD_S
 

@@ -14,13 +14,13 @@ import msgspec
 from lira.hal.bus.bus import Bus
 from lira.hal.bus.keys import VARIABLE as KEYS_VARIABLE
 from lira.hal.bus.keys import load_keys
+from lira.hal.bus.services import release_estop
 from lira.hal.bus.topics import APPLIED, DIAGNOSTICS, INFO, RESET
 from lira.hal.errors import BusError
 from lira.hal.messages import Episode, Source
 from lira.hal.profile import RobotProfile, load_profile
-from lira.hal.server.estop_service import release_estop
 from lira.tools.launch import link_fault as relay
-from lira.tools.launch.processes import ChildProcess, free_port
+from lira.tools.launch.processes import ChildProcess, ProcessError, free_port
 from lira.tools.stop_test import driver, hand, launch, pulse, robot, world
 from lira.tools.stop_test.acts import StopTestError
 from lira.tools.stop_test.control import ASK_TIME, TIME, tell
@@ -79,7 +79,7 @@ class ProcessBench:
         self.observer.ask(INFO)
         self._applied, self._reports = self.observer.reader(APPLIED), self.observer.reader(DIAGNOSTICS)
         self.intruder = Intruder(self.observer, self._journal.folder, self._keyring)
-        stack.callback(self.intruder.rest)
+        stack.callback(self.intruder.close)
 
     @property
     def driver(self) -> ChildProcess:
@@ -174,9 +174,13 @@ class ProcessBench:
         return bool(wheels) and wheels[-1].linear_m_s > share * self.profile.base.max_linear_m_s
 
     def ask_for_motion(self) -> None:
-        """Have the commander, or another if it is dead, ask for motion, and never for zero."""
+        """Have the commander, or another if it is dead, ask for motion, and never for zero.
+
+        A robot that lets nobody come back is asked by nobody, and that is what fails its row.
+        """
         if self._running[POLICY].status() is not None:
-            self._run_driver()
+            with contextlib.suppress(ProcessError):
+                self._run_driver()
         self._running[self._tested].signal(signal.SIGCONT)
         tell(self._ports[POLICY], "insist")
 

@@ -6,6 +6,9 @@ examples:
   lira bench latency --json latency.json
   lira bench soak --minutes 5
   lira bench drivers --minutes 10       how many samples the lidar's line loses in ten minutes
+  lira bench twin --history bench/history   note its ratios there, and compare them with those before
+
+exit status: 1 if something that has to stay flat did not, or a ratio is over 30 % worse than it was on this machine
 """
 
 import argparse
@@ -31,6 +34,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--minutes", type=float, help="how long the soak (default: 30) or the line of drivers (0.25) goes on"
     )
     parser.add_argument("--json", metavar="FILE", help="write a JSON object to FILE (-: standard output)")
+    parser.add_argument("--history", type=Path, metavar="DIR", help="add the ratios to DIR/NAME.jsonl and compare")
 
 
 def run(args: argparse.Namespace) -> int:
@@ -40,19 +44,31 @@ def run(args: argparse.Namespace) -> int:
     output = take_stdout() if args.json == "-" else sys.stdout
     module = importlib.import_module(f"lira.tools.bench.{args.name}")
     results: list[Row] = module.run(args.minutes) if args.minutes is not None else module.run()
-    if args.json is not None:
-        text = json.dumps({"name": args.name, "machine": describe_machine(), "results": results}, indent=2)
-        if args.json == "-":
-            print(text, file=output, flush=True)
-            return exit_status(results)
+    text = json.dumps({"name": args.name, "machine": describe_machine(), "results": results}, indent=2)
+    if args.json not in (None, "-"):
         write_file(Path(args.json), text)
-    print(table(results), file=output)
-    return exit_status(results)
+    print(text if args.json == "-" else table(results), file=output, flush=True)
+    slower = False if args.history is None else note(args.history / f"{args.name}.jsonl", results)
+    return 1 if slower or exit_status(results) else 0
 
 
 def exit_status(results: list[Row]) -> int:
     """1 if a row says that something that has to stay flat did not."""
     return 1 if any(row.get("flat") is False for row in results) else 0
+
+
+def note(path: Path, results: list[Row]) -> bool:
+    """Add the ratios to a benchmark's history, and say on standard error which are worse than before, if any."""
+    from importlib.metadata import version
+
+    from lira.tools.output.bench_history import append, entry, read_history, worse
+
+    before, now = read_history(path), entry(describe_machine(), version("lira-rosbot"), results)
+    append(path, now)
+    lines = worse(now, before)
+    if lines:
+        print(f"worse than before: {'; '.join(lines)}", file=sys.stderr)
+    return bool(lines)
 
 
 def take_stdout() -> TextIO:

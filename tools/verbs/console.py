@@ -43,8 +43,8 @@ def run(args: argparse.Namespace) -> int:
         return 0
 
     from lira.hal.bus.bus import Bus
+    from lira.hal.bus.services import LOCKSTEP, info_from_json
     from lira.hal.bus.topics import INFO
-    from lira.hal.server.info_service import LOCKSTEP, info_from_json
     from lira.tools.console.listen import Ears
     from lira.tools.joystick.client import Wheel
 

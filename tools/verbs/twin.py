@@ -156,8 +156,8 @@ def serve_arena(wired: "WiredTwin", bus: "Bus", profile: "RobotProfile", stop: t
     """Tell the truth, and put the robot back when asked, until told to stop."""
     import msgspec
 
+    from lira.hal.bus.services import REALTIME, Info
     from lira.hal.server.arena import ArenaLoop
-    from lira.hal.server.info_service import REALTIME, Info
 
     info = Info(profile, REALTIME, bus.epoch, msgspec.Raw(wired.twin.info))
     ArenaLoop(wired, bus, info, wired.twin.now).run(stop)

@@ -1,0 +1,58 @@
+"""Which kind of test a file holds, by what it imports: nobody has to remember to mark one.
+
+`unit`: pure, in milliseconds; `twin`: renders, looks ahead or trains; `processes`: starts processes, threads of a
+server, a bus or a line, so that it wants the machine for itself.
+"""
+
+import ast
+from functools import cache
+from pathlib import Path
+
+ROOT = Path(__file__).parent.parent
+PROCESSES = (
+    "lira.hal.bus.bus",
+    "lira.hal.server",
+    "lira.hal.client",
+    "lira.robot.camera.device",
+    "lira.robot.core2.device",
+    "lira.robot.rosbot",
+    "lira.robot.rplidar.device",
+    "lira.robot.serial_port",
+    "lira.robot.supervisor",
+    "lira.tools.bench",
+    "lira.tools.launch",
+    "lira.sim_backend.emulators.wire",
+    "lira.fusion.learning.trainer",
+    "multiprocessing",
+    "pty",
+    "socket",
+    "subprocess",
+    "threading",
+    "zenoh",
+)
+TWIN = ("lira.sim_backend", "lira.fusion.learning", "lira.fusion.policies", "lira.tools", "pybullet", "torch")
+
+
+@cache
+def kind_of(path: Path) -> str:
+    """Return "unit", "twin" or "processes" for a test file, with the helpers beside it that it imports."""
+    names = _imported(path)
+    helpers = [path.parent / f"{name}.py" for name in names if (path.parent / f"{name}.py").is_file()]
+    kinds = {kind_of(helper) for helper in helpers}
+    if "processes" in kinds or _any_of(PROCESSES, names) or "e2e" in path.parts or "attack" in path.parts:
+        return "processes"
+    return "twin" if "twin" in kinds or _any_of(TWIN, names) else "unit"
+
+
+def _imported(path: Path) -> set[str]:
+    names: set[str] = set()
+    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        if isinstance(node, ast.Import):
+            names |= {alias.name for alias in node.names}
+        elif isinstance(node, ast.ImportFrom) and node.module:
+            names |= {node.module, *(f"{node.module}.{alias.name}" for alias in node.names)}
+    return names
+
+
+def _any_of(roots: tuple[str, ...], names: set[str]) -> bool:
+    return any(name == root or name.startswith(f"{root}.") for name in names for root in roots)
