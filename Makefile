@@ -38,6 +38,7 @@ check: setup ## ruff, mypy (strict), who may import whom
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
+	$(BIN)/mypy examples/*.py
 	$(BIN)/python -m pytest tests/test_layering.py
 
 docs: setup ## the documentation, into site/; a warning fails it

@@ -6,7 +6,7 @@ from typing import Protocol
 
 from lira.fusion.methods.base import STAND, Choice, Chooser, Lesson, Method, Policy, Proposal
 from lira.fusion.preprocess import Features, Preprocessor
-from lira.hal.errors import SensorError
+from lira.hal.errors import PluginError, SensorError
 from lira.hal.messages import HELD as HELD
 from lira.hal.messages import STOP, Action, Applied, Command, CourseState, Observation, Reason, Source, Twist
 from lira.hal.port import Restartable, Robot
@@ -88,7 +88,7 @@ class ControlLoop:
         if features is None:
             self._stand(observation)
             return None
-        proposal = method.propose(features)
+        proposal = self._propose(method, features)
         state = None if self._truth is None else self._truth()
         if teacher is not None and state is not None:
             offers = method.offers if isinstance(method, Chooser) else {}
@@ -127,6 +127,14 @@ class ControlLoop:
         silent = [name for name, seen in (("lidar", observation.scan), ("camera", observation.image)) if seen is None]
         self.trouble = f"nothing new from the {' and the '.join(silent)}" if silent else ""
         return features
+
+    def _propose(self, method: Method, features: Features) -> Proposal:
+        """Ask the method. What comes of somebody's own is checked here, where its name is still known."""
+        proposal: object = method.propose(features)
+        if not isinstance(proposal, Proposal):
+            what = f"{type(method).__module__}:{type(method).__qualname__} proposed {proposal!r}"
+            raise PluginError(what, "Let `propose` return a lira.Proposal.")
+        return proposal
 
     def _driving_policy(self, method: Method, proposal: Proposal) -> Policy | None:
         driver = proposal.choice.driver

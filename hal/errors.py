@@ -40,6 +40,10 @@ class StorageError(LiraError):
     """A log or checkpoint that is corrupt, or a disk that does not take it."""
 
 
+class PluginError(LiraError):
+    """What somebody brought along (an expert, a method, a robot, an experiment) does not do what it should."""
+
+
 class MissingExtraError(LiraError):
     """A verb needs an optional part of the installation that is not there."""
 

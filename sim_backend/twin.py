@@ -4,6 +4,8 @@ import math
 import threading
 import time
 
+import msgspec
+
 from lira.hal.bus.sensors import observation_of, same_readings
 from lira.hal.errors import ConfigError, DeviceError
 from lira.hal.messages import STOP, Applied, Command, CourseState, Episode, Observation, Reason, Source, Twist
@@ -60,6 +62,11 @@ class Twin:
     def profile(self) -> RobotProfile:
         """The robot's profile."""
         return self._profile
+
+    @property
+    def info(self) -> bytes:
+        """What it says about its world to whoever asks: the world as JSON."""
+        return msgspec.json.encode(self.world)
 
     @property
     def layout(self) -> Layout:

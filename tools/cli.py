@@ -8,6 +8,7 @@ import sys
 from typing import TYPE_CHECKING, NamedTuple, NoReturn, Protocol, cast
 
 from lira.hal.errors import ConfigError, LiraError, MissingExtraError
+from lira.hal.plugins import blame
 from lira.tools.launch import lifetime
 
 if TYPE_CHECKING:
@@ -36,6 +37,7 @@ VERBS = {
     ),
     "train-expert": Verb("lira.tools.verbs.train_expert", "train the camera or the lidar expert"),
     "experiment": Verb("lira.tools.verbs.experiment", "repeat an experiment of the thesis, with statistics"),
+    "new": Verb("lira.tools.verbs.new", "begin an expert, a method, a robot, a sensor or a world of your own"),
     "joystick": Verb("lira.tools.verbs.joystick", "drive by hand: a gamepad on this machine, straight to the robot"),
     "console": Verb("lira.tools.verbs.console", "watch the robot learn on a screen"),
     "report": Verb("lira.tools.verbs.report", "make the HTML page of a recorded run"),
@@ -106,23 +108,26 @@ def main(arguments: list[str] | None = None) -> int:
     except BrokenPipeError:
         lifetime.abandon_output()
         return EXIT_BROKEN_PIPE
-    except ModuleNotFoundError as error:
-        extra = EXTRAS.get((error.name or "").split(".")[0])
-        if extra is None:
+    except Exception as error:
+        told = told_of(error)
+        if told is None:
             raise
-        return complain(prefix, MissingExtraError(str(error.name), extra))
-    except LiraError as error:
-        return complain(prefix, error)
-    except OSError as error:
-        if not lifetime.is_unwritable(error):
-            raise
+        return complain(prefix, told)
+
+
+def told_of(error: Exception) -> LiraError | None:
+    """Return what to tell the user about an error: what they can mend; None for a fault of the project's own."""
+    if isinstance(error, LiraError):
+        return error
+    if isinstance(error, ModuleNotFoundError):
+        missing = str(error.name)
+        extra = EXTRAS.get(missing.split(".")[0])
+        return blame(error) if extra is None else MissingExtraError(missing, extra)
+    if isinstance(error, OSError) and lifetime.is_unwritable(error):
         lifetime.abandon_output()
-        return complain(prefix, lifetime.unwritable(error))
-    except (MemoryError, RuntimeError, ImportError) as error:
-        scarce = lifetime.out_of_memory(error)
-        if scarce is None:
-            raise
-        return complain(prefix, scarce)
+        return lifetime.unwritable(error)
+    scarce = lifetime.out_of_memory(error) if isinstance(error, MemoryError | RuntimeError | ImportError) else None
+    return scarce or blame(error)
 
 
 def entry() -> NoReturn:

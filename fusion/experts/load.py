@@ -1,15 +1,24 @@
-"""Experts by name: those that come with the project, or a user's own checkpoint by path."""
+"""Policies by name: those of the project, a user's own checkpoint by path, or a black box by MODULE:OBJECT."""
 
-from lira.fusion.experts.files import expert_path
+import math
+import re
+from collections.abc import Callable
+from dataclasses import replace
+from typing import cast
+
+import numpy as np
+
+from lira.fusion.experts.files import SHIPPED, expert_path
 from lira.fusion.experts.tasks import DEFAULT
-from lira.fusion.methods.base import Alone, Expert
+from lira.fusion.methods.base import Alone, Expert, Method, Policy
 from lira.fusion.methods.doubt import Doubtful
 from lira.fusion.policies.checkpoint import Checkpoint, load_checkpoint
 from lira.fusion.policies.kernel_net import KernelNet
 from lira.fusion.policies.networks import Network
 from lira.fusion.preprocess import Features
-from lira.hal.errors import ConfigError
+from lira.hal.errors import ConfigError, PluginError
 from lira.hal.messages import Action
+from lira.hal.plugins import EXPERTS
 from lira.hal.profile import RobotProfile
 
 
@@ -38,18 +47,70 @@ def as_expert(name: str, network: Network, cruise: Action | None) -> Expert:
     return Expert(name, act) if cruise is None else Expert(name, act, cruise)
 
 
-def load_alone(name_or_path: str, profile: RobotProfile, pair: str = DEFAULT, *, ask: bool = False) -> Alone | Doubtful:
-    """Load a policy to drive alone; with `ask` it stands and calls where it doubts. `ConfigError`: it cannot tell."""
-    network, checkpoint = load_network(name_or_path, profile, pair)
-    act = as_expert(checkpoint.kind, network, checkpoint.cruise).act
+def load_policy(given: str | Expert | Policy, profile: RobotProfile, pair: str = DEFAULT) -> Expert:
+    """Load a policy: an expert of a pair, a checkpoint, or a black box, by MODULE:OBJECT or as it is.
+
+    A network is named after its sensor, or after what kind of novice it is; a black box after its object. Raises
+    `ConfigError`, `StorageError` for a damaged file, `PluginError` for a plug-in that does not load.
+    """
+    return _load(given, profile, pair)[0]
+
+
+def load_alone(
+    given: str | Expert | Policy, profile: RobotProfile, pair: str = DEFAULT, *, ask: bool = False
+) -> Method:
+    """Load a policy to drive alone; with `ask` it stands and calls where it doubts.
+
+    Raises what `load_policy` raises, and `ConfigError` for one that cannot tell.
+    """
+    expert, network = _load(given, profile, pair)
     if not ask:
-        return Alone(checkpoint.kind, act)
+        return Alone(expert.name, expert.act)
     if not isinstance(network, KernelNet):
-        raise ConfigError(f"'{name_or_path}' cannot tell what it does not know", "A novice taught by plus can.")
-    return Doubtful(act, network.doubts)
+        raise ConfigError(f"'{given}' cannot tell what it does not know", "A novice taught by plus can.")
+    return Doubtful(expert.act, network.doubts)
 
 
-def load_expert(name_or_path: str, profile: RobotProfile, pair: str = DEFAULT) -> Expert:
-    """Load an expert; it is named after its sensor."""
-    network, checkpoint = load_network(name_or_path, profile, pair)
-    return as_expert(checkpoint.kind, network, checkpoint.cruise)
+def _load(given: str | Expert | Policy, profile: RobotProfile, pair: str) -> tuple[Expert, Network | None]:
+    """Load a policy, and the network that it is; None for a black box."""
+    if not isinstance(given, str):
+        names = (getattr(given, "name", None), getattr(given, "__name__", None), type(given).__name__)
+        return own_expert(given, next(str(name) for name in names if name), profile), None
+    if not given.endswith(".safetensors"):
+        found = EXPERTS.find(given, {f"{name}-expert": name for name in SHIPPED})
+        if found not in SHIPPED:
+            return own_expert(found, given, profile), None
+    network, checkpoint = load_network(given, profile, pair)
+    return as_expert(checkpoint.kind, network, checkpoint.cruise), network
+
+
+def own_expert(found: object, name: str, profile: RobotProfile) -> Expert:
+    """Make an expert of what a plug-in offers: an `Expert`, a function of `Features`, or a class of such functions.
+
+    A class is made from the robot's profile. Raises `ConfigError` for anything else.
+    """
+    if isinstance(found, type):
+        found = cast(Callable[[RobotProfile], object], found)(profile)
+    if isinstance(found, Expert):
+        return replace(found, act=checked(found.act, name))
+    if not callable(found):
+        what = f"the policy '{name}' is a {type(found).__name__}"
+        raise ConfigError(what, "Give a function of lira.Features, a class that is called like one, or a lira.Expert.")
+    return Expert(re.split(r"[:.]", name)[-1], checked(found, name))
+
+
+def checked(act: Callable[[Features], object], name: str) -> Policy:
+    """Clip what somebody's policy does to [-1, 1]. Raises `PluginError` when it answers with no action at all."""
+
+    def act_in_range(features: Features) -> Action:
+        answer = act(features)
+        try:
+            linear, angular = np.clip(np.asarray(answer, dtype=np.float64), -1.0, 1.0).tolist()
+        except (TypeError, ValueError):
+            linear = angular = math.nan
+        if not (math.isfinite(linear) and math.isfinite(angular)):
+            what = f"the policy '{name}' answered {answer!r}"
+            raise PluginError(what, "Let it return two finite numbers in [-1, 1]: (linear, angular).")
+        return linear, angular
+
+    return act_in_range

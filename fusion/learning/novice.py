@@ -10,6 +10,7 @@ from abc import ABC, abstractmethod
 from typing import Literal, Protocol
 
 from lira.fusion.learning.labels import is_rest
+from lira.fusion.learning.learned_policy import LearnedPolicy
 from lira.fusion.learning.learner import Label, Weights
 from lira.fusion.policies.ensemble import EnsembleNet
 from lira.fusion.policies.networks import Network
@@ -60,35 +61,26 @@ def is_redundant(a: Action, a_n: Action, threshold: float) -> bool:
     return all(abs(x - y) < threshold for x, y in zip(a, a_n, strict=True))
 
 
-class Novice(ABC):
-    """A policy under training. It changes between two steps, never during one."""
+class Novice(LearnedPolicy, ABC):
+    """The project's policy under training. It changes between two steps, never during one."""
 
     def __init__(self, settings: LearningSettings) -> None:
         self.settings = settings
         self.stored = 0
         self.training_steps = 0  # finished ones
 
-    @property
-    def trained(self) -> bool:
-        """Whether the first training step is done."""
-        return self.training_steps > 0
-
     @abstractmethod
     def act(self, features: Features) -> Action:
         """a^N as it is now."""
-
-    def alone(self, features: Features) -> Action:
-        """What it does when nobody teaches it any more: the same, unless a novice knows how it errs."""
-        return self.act(features)
-
-    def proving(self, features: Features) -> Action:
-        """The same in a run that proves it, from which it may learn what it knows."""
-        return self.alone(features)
 
     def knows(self, features: Features, share: float) -> bool:  # noqa: ARG002
         """Whether it is surer here than it was at all but that share of what a human had to show it; never if it
         cannot tell.
         """
+        return False
+
+    def doubts(self, features: Features) -> bool:  # noqa: ARG002
+        """Whether it knows less here than where it was proven; never if it cannot tell."""
         return False
 
     @abstractmethod
@@ -98,10 +90,6 @@ class Novice(ABC):
     @abstractmethod
     def frozen(self) -> Network:
         """Return a copy of the policy as it drives alone, to be saved."""
-
-    def set_aside(self) -> list[tuple[int, str]]:
-        """Number and source of the labels it does not believe; none, unless a novice can tell."""
-        return []
 
     def learn(self, features: Features, action: Action, source: str, a_n: Action) -> bool:
         """Store a label unless it is redundant; `a_n` is the novice's own action there. Returns whether it was kept."""
@@ -120,14 +108,8 @@ class Novice(ABC):
         """How much a label of this source counts."""
         return self.settings.human_weight if source == "human" else 1.0
 
-    def update(self, now_s: float) -> None:  # noqa: B027 - who has learned already has nothing to adopt
-        """Adopt what training has brought, and begin what is due."""
-
-    def catch_up(self) -> None:  # noqa: B027
+    def catch_up(self) -> None:
         """Wait until everything that is due is learned."""
-
-    def close(self) -> None:  # noqa: B027
-        """End the training, in bounded time."""
 
 
 class NetworkNovice(Novice):

@@ -1,10 +1,12 @@
 """What a way of teaching looks like to the control loop: it proposes before the robot moves and learns after."""
 
-from collections.abc import Callable, Mapping
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 from typing import Protocol, runtime_checkable
 
+from lira.fusion.learning.learned_policy import UNTAUGHT, LearnedPolicy
 from lira.fusion.preprocess import Features
 from lira.hal.messages import Action, ExpertView
 
@@ -85,23 +87,61 @@ class Lesson:
     settled: tuple[Settled, ...] = ()
 
 
-class Method(Protocol):
-    """A way of driving and, perhaps, of learning."""
+class Method(ABC):
+    """A way of driving and, perhaps, of learning: `propose` is what it has to say, all else has a default.
 
-    def reset(self) -> None:
+    `novice` is the policy under training, `UNTAUGHT` where nobody learns, and `experts` are those it asks.
+    """
+
+    novice: LearnedPolicy = UNTAUGHT
+    experts: Sequence[Expert] = ()
+
+    @property
+    def learns(self) -> bool:
+        """Whether there is a policy under training."""
+        return self.novice is not UNTAUGHT
+
+    def reset(self) -> None:  # noqa: B027 - there may be nothing to forget
         """Forget what belongs to the past episode."""
 
     def update(self, now_s: float) -> None:
-        """Adopt what training has brought by now."""
+        """Train if it is time to, and adopt what training has brought by now."""
+        self.novice.update(now_s)
 
+    @abstractmethod
     def propose(self, features: Features) -> Proposal:
         """Decide as if no human were there."""
 
     def learn(self, proposal: Proposal, human: Action | None) -> Lesson:
-        """Learn from what was executed; `human` is the human's action if the human drove."""
+        """Learn from what was executed; `human` is the human's action if the human drove, and then it is the label.
+
+        An idle frame that is to be left out is none.
+        """
+        if human is None:
+            return Lesson(proposal.choice)
+        if not self.learns or self.novice.leaves_out(human):
+            return Lesson(Choice("human", human))
+        stored = self.novice.learn(proposal.features, human, "human", proposal.novice)
+        return Lesson(Choice("human", human, label=human), stored)
 
     def policy(self, driver: str) -> Policy:
         """Return the policy behind a driver's name, to look ahead with. Raises `KeyError` for "human"."""
+        return {**{expert.name: expert.act for expert in self.experts}, "novice": self.novice.act}[driver]
+
+    def alone(self, phase: str) -> "Method":
+        """Return what drives without a teacher, in phase "prove" or "unseen": the novice, if anybody learns."""
+        if not self.learns:
+            return self
+        return Alone("novice", self.novice.proving if phase == "prove" else self.novice.alone)
+
+    @property
+    def calls_alone(self) -> bool:
+        """Whether what drives alone on unseen layouts may call for somebody to answer."""
+        return False
+
+    def close(self) -> None:
+        """End the training, in bounded time."""
+        self.novice.close()
 
 
 @runtime_checkable
@@ -117,26 +157,16 @@ class Chooser(Protocol):
 
 
 @dataclass(frozen=True, slots=True)
-class Alone:
+class Alone(Method):
     """A policy that drives by itself and learns nothing: an expert on show, or the novice's proving run."""
 
     name: str
     act: Policy
 
-    def reset(self) -> None:
-        """Nothing to forget."""
-
-    def update(self, now_s: float) -> None:
-        """Nothing to adopt."""
-
     def propose(self, features: Features) -> Proposal:
         """Propose the policy's own action."""
         action = self.act(features)
         return Proposal(features, Choice(self.name, action), novice=action)
-
-    def learn(self, proposal: Proposal, human: Action | None) -> Lesson:
-        """Learn nothing; the human may still take over."""
-        return Lesson(proposal.choice if human is None else Choice("human", human))
 
     def policy(self, driver: str) -> Policy:  # noqa: ARG002 - whoever drives, it is this one
         """Return the one policy there is."""

@@ -4,18 +4,23 @@ It never drives before it is asked to prove itself, so it never sees where its o
 """
 
 from lira.fusion.learning.novice import Novice
-from lira.fusion.methods.base import STAND, Call, Choice, Lesson, Policy, Proposal
+from lira.fusion.methods.base import STAND, Call, Choice, Method, Proposal
+from lira.fusion.methods.context import Context, MethodSettings
 from lira.fusion.preprocess import Features
-from lira.hal.config import Table
-from lira.hal.messages import Action
 
 
-class CloningSettings(Table, frozen=True, tag="cloning"):
+class CloningSettings(MethodSettings, frozen=True, tag="cloning"):
     """There is nothing to set: m and the network are those of every method."""
 
+    def build(self, context: Context) -> Method:
+        """Clone with a novice of its own."""
+        return Cloning(context.novice())
 
-class Cloning:
+
+class Cloning(Method):
     """The human drives. As many training steps as the other methods would have done follow at the end of the lap."""
+
+    novice: Novice
 
     def __init__(self, novice: Novice) -> None:
         self.novice = novice
@@ -30,16 +35,3 @@ class Cloning:
     def propose(self, features: Features) -> Proposal:
         """Ask the human to drive."""
         return Proposal(features, Choice("human", STAND, call=Call.FEEDBACK), self.novice.act(features))
-
-    def learn(self, proposal: Proposal, human: Action | None) -> Lesson:
-        """Store the human's action, unless it is an idle frame that is to be left out."""
-        if human is None:
-            return Lesson(proposal.choice)
-        if self.novice.leaves_out(human):
-            return Lesson(Choice("human", human))
-        stored = self.novice.learn(proposal.features, human, "human", proposal.novice)
-        return Lesson(Choice("human", human, label=human), stored)
-
-    def policy(self, driver: str) -> Policy:
-        """The novice is the only policy."""
-        return {"novice": self.novice.act}[driver]

@@ -9,9 +9,11 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from lira.fusion.methods.base import STAND, Call, Choice, Lesson, Policy, Proposal
+from lira.fusion.learning.novice import NetworkNovice, Novice
+from lira.fusion.methods.base import STAND, Call, Choice, Method, Policy, Proposal
+from lira.fusion.policies.ensemble import EnsembleNet
 from lira.fusion.preprocess import Features
-from lira.hal.messages import Action, FloatArray
+from lira.hal.messages import FloatArray
 
 Ensemble = Callable[[Features], FloatArray]
 """What each policy of an ensemble would do: float32 [b, 2]."""
@@ -29,6 +31,12 @@ def threshold(doubts: Sequence[float]) -> float:
     if not doubts:
         return math.inf
     return float(np.mean(doubts[-math.ceil(LAST * len(doubts)) :]))
+
+
+def log_of(novice: Novice) -> "DoubtLog | None":
+    """Return an empty log of what a novice's ensemble thinks; None for a novice without one."""
+    network = novice.network if isinstance(novice, NetworkNovice) else None
+    return DoubtLog(network.opinions) if isinstance(network, EnsembleNet) else None
 
 
 class DoubtLog:
@@ -56,18 +64,12 @@ class DoubtLog:
         return self.doubt(features) > self.threshold
 
 
-class Doubtful:
+class Doubtful(Method):
     """A novice alone; where it `doubts` too much it stands and asks. Nothing is learned from the answer."""
 
     def __init__(self, novice: Policy, doubts: Callable[[Features], bool]) -> None:
         self._novice = novice
         self._doubts = doubts
-
-    def reset(self) -> None:
-        """Nothing to forget."""
-
-    def update(self, now_s: float) -> None:
-        """Nothing to adopt."""
 
     def propose(self, features: Features) -> Proposal:
         """The novice's action, or to stand and call for feedback."""
@@ -75,10 +77,6 @@ class Doubtful:
         if self._doubts(features):
             return Proposal(features, Choice("novice", STAND, call=Call.FEEDBACK), a_n)
         return Proposal(features, Choice("novice", a_n), a_n)
-
-    def learn(self, proposal: Proposal, human: Action | None) -> Lesson:
-        """Learn nothing."""
-        return Lesson(proposal.choice if human is None else Choice("human", human))
 
     def policy(self, driver: str) -> Policy:
         """What would drive from here on, standing included."""

@@ -6,14 +6,14 @@ At test time the novice may doubt: `fusion/doubt.py`.
 from typing import Literal
 
 from lira.fusion.learning.novice import Novice
-from lira.fusion.methods.base import STAND, Call, Choice, Lesson, Policy, Proposal
-from lira.fusion.methods.doubt import DoubtLog
+from lira.fusion.methods.base import STAND, Call, Choice, Lesson, Method, Proposal
+from lira.fusion.methods.context import Context, MethodSettings
+from lira.fusion.methods.doubt import Doubtful, DoubtLog, log_of
 from lira.fusion.preprocess import Features
-from lira.hal.config import Table
 from lira.hal.messages import Action
 
 
-class HgDaggerSettings(Table, frozen=True, tag="hg-dagger"):
+class HgDaggerSettings(MethodSettings, frozen=True, tag="hg-dagger"):
     """In which runs the novice, driving alone, stops when it is in doubt, and how many policies it asks about that.
 
     Without any there is no ensemble. With one the novice learns what it learns without.
@@ -22,25 +22,30 @@ class HgDaggerSettings(Table, frozen=True, tag="hg-dagger"):
     doubt: tuple[Literal["prove", "unseen"], ...] = ()
     ensemble: int = 5
 
+    def build(self, context: Context) -> Method:
+        """Teach a novice, with an ensemble if it is to doubt."""
+        novice = context.novice(ensemble=self.ensemble if self.doubt else 0)
+        return HgDagger(novice, log_of(novice), self.doubt)
 
-class HgDagger:
+
+class HgDagger(Method):
     """The novice drives; the human takes the wheel when the novice errs. It also trains the experts.
 
-    `log`, if there is one, notes how much the novice doubted whenever the human took over.
+    `log`, if there is one, notes how much the novice doubted whenever the human took over; driving alone, the novice
+    stops and asks in the phases `doubt`.
     """
 
-    def __init__(self, novice: Novice, log: DoubtLog | None = None) -> None:
+    novice: Novice
+
+    def __init__(self, novice: Novice, log: DoubtLog | None = None, doubt: tuple[str, ...] = ()) -> None:
         self.novice = novice
         self.log = log
+        self._doubt = doubt
         self.reset()
 
     def reset(self) -> None:
         """Nobody holds the wheel when an episode begins."""
         self._human_drove = False
-
-    def update(self, now_s: float) -> None:
-        """Train, and adopt what training has brought."""
-        self.novice.update(now_s)
 
     def propose(self, features: Features) -> Proposal:
         """The novice's action; before its first training step it asks the human to drive."""
@@ -53,15 +58,17 @@ class HgDagger:
         """Store the human's action, unless it is an idle frame that is to be left out."""
         taken_over = human is not None and not self._human_drove
         self._human_drove = human is not None
-        if human is None:
-            return Lesson(proposal.choice)
         if taken_over and self.log is not None and self.novice.trained:
             self.log.take_over(proposal.features)
-        if self.novice.leaves_out(human):
-            return Lesson(Choice("human", human))
-        stored = self.novice.learn(proposal.features, human, "human", proposal.novice)
-        return Lesson(Choice("human", human, label=human), stored)
+        return super().learn(proposal, human)
 
-    def policy(self, driver: str) -> Policy:
-        """The novice is the only policy."""
-        return {"novice": self.novice.act}[driver]
+    def alone(self, phase: str) -> Method:
+        """The novice, which may doubt."""
+        if self.log is not None and phase in self._doubt:
+            return Doubtful(self.novice.alone, self.log.exceeds)
+        return super().alone(phase)
+
+    @property
+    def calls_alone(self) -> bool:
+        """Whether it doubts on unseen layouts."""
+        return self.log is not None and "unseen" in self._doubt

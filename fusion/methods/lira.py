@@ -10,18 +10,19 @@ unreachable; the text says "a single expert", and so does `choose`.
 from collections import deque
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import Literal
+from typing import Literal, Self
 
+import msgspec
 import numpy as np
 
 from lira.fusion.learning.novice import Novice
-from lira.fusion.methods.base import STAND, Call, Choice, Expert, Lesson, Policy, Proposal
+from lira.fusion.methods.base import STAND, Call, Choice, Expert, Lesson, Method, Policy, Proposal
+from lira.fusion.methods.context import Context, MethodSettings
 from lira.fusion.preprocess import Features
-from lira.hal.config import Table
 from lira.hal.messages import Action, ExpertView
 
 
-class LiraSettings(Table, frozen=True, tag="lira"):
+class LiraSettings(MethodSettings, frozen=True, tag="lira"):
     """The thresholds, as fractions of the action range, and what the thesis leaves open.
 
     `hold` (not in the thesis) also counts an expert as active while its action is further than this from its cruise
@@ -35,6 +36,14 @@ class LiraSettings(Table, frozen=True, tag="lira"):
     slow_down: float = 0.3  # speed factor while feedback is called for (assumed)
     hold: float | None = 0.2
     start: Literal["human", "experts"] = "human"  # who drives before the first training step
+
+    def build(self, context: Context) -> Method:
+        """Teach a novice with these experts."""
+        return LiraSpf(context.experts, context.novice(), self, context.period_s)
+
+    def starting(self, who: str) -> Self:
+        """Return the same with the human or the experts driving first."""
+        return msgspec.convert({**msgspec.to_builtins(self), "start": who}, type(self))
 
 
 PRESETS = {"hold": LiraSettings(), "thesis": LiraSettings(hold=None)}
@@ -71,8 +80,10 @@ def choose(human: Action | None, experts: Sequence[ExpertView], a_n: Action, thr
     return Choice("novice", a_n, call=Call.FEEDBACK)  # lines 19 to 21; slowed down
 
 
-class LiraSpf:
+class LiraSpf(Method):
     """Learning Interactively to Resolve Ambiguity in Sensor Policy Fusion."""
+
+    novice: Novice
 
     def __init__(self, experts: Sequence[Expert], novice: Novice, settings: LiraSettings, period_s: float) -> None:
         if len(experts) < 2:
@@ -115,11 +126,9 @@ class LiraSpf:
 
     def policy(self, driver: str) -> Policy:
         """The policy behind a driver's name."""
-        if driver == "novice":
-            return self.novice.act
         if driver == "mean":
             return lambda features: mean([expert.act(features) for expert in self.experts])
-        return {expert.name: expert.act for expert in self.experts}[driver]
+        return super().policy(driver)
 
     @property
     def _theta(self) -> float:

@@ -14,14 +14,15 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 from lira.fusion.learning.novice import Novice
-from lira.fusion.methods.base import Call, Choice, Expert, Lesson, Policy, Proposal, Settled
+from lira.fusion.methods.base import Call, Choice, Expert, Lesson, Method, Policy, Proposal, Settled
+from lira.fusion.methods.context import Context, MethodSettings
+from lira.fusion.methods.doubt import Doubtful
 from lira.fusion.methods.lira import LiraSettings, LiraSpf, choose
 from lira.fusion.preprocess import Features
-from lira.hal.config import Table
 from lira.hal.messages import Action
 
 
-class PlusSettings(Table, frozen=True, tag="plus"):
+class PlusSettings(MethodSettings, frozen=True, tag="plus"):
     """What `plus` adds to `lira`. 0 switches a part off, for `sure` None."""
 
     lira: LiraSettings = LiraSettings()
@@ -30,6 +31,10 @@ class PlusSettings(Table, frozen=True, tag="plus"):
     wheel_s: float = 1.0  # an expert that was given the wheel keeps it so long
     sure: float | None = None  # surer than at all but this share of what the human showed, the novice is not helped
     ask: bool = False  # on unseen layouts it stops and asks where it doubts
+
+    def build(self, context: Context) -> Method:
+        """Teach a novice with these experts."""
+        return LiraPlus(context.experts, context.novice(), self, context.period_s)
 
 
 class LiraPlus(LiraSpf):
@@ -89,6 +94,17 @@ class LiraPlus(LiraSpf):
             past = self._reserved.popleft()
             settled = (*settled, Settled(past, super().learn(past, None).stored))
         return Lesson(proposal.choice, reserved=True, settled=settled)
+
+    def alone(self, phase: str) -> Method:
+        """The novice, which on unseen layouts may stop and ask."""
+        if phase == "unseen" and self.calls_alone:
+            return Doubtful(self.novice.alone, self.novice.doubts)
+        return super().alone(phase)
+
+    @property
+    def calls_alone(self) -> bool:
+        """Whether it asks on unseen layouts."""
+        return self._plus.ask
 
     def _drop(self) -> tuple[Settled, ...]:
         dropped = tuple(Settled(past, stored=False) for past in self._reserved)

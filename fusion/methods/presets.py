@@ -1,14 +1,20 @@
-"""Every way of teaching that comes with the project, by name: the one table that commands, experiments and tests use.
+"""Every way of teaching by name: the one table of those that come with the project, and the door to a user's own.
 
-What belongs to an approach is in its own settings; what could be combined with any of them is in `Method`.
+What belongs to an approach is in its own settings; what could be combined with any of them is in `Preset`.
 """
 
-from typing import Literal
+import inspect
+import re
+from collections.abc import Callable
+from pathlib import Path
+from typing import Literal, cast
 
 import msgspec
 
 from lira.fusion.learning.novice import LearningSettings
+from lira.fusion.methods.base import Method
 from lira.fusion.methods.cloning import CloningSettings
+from lira.fusion.methods.context import Context, MethodSettings, Trunks
 from lira.fusion.methods.hg_dagger import HgDaggerSettings
 from lira.fusion.methods.lira import PRESETS, LiraSettings
 from lira.fusion.methods.plus import PlusSettings
@@ -16,13 +22,40 @@ from lira.fusion.methods.shared_feedback import SharingSettings
 from lira.fusion.methods.switching import SwitchingSettings
 from lira.fusion.methods.syllabus import FRESH, THESIS, Syllabus
 from lira.fusion.policies.kernel import KernelSettings
-from lira.hal.errors import ConfigError
+from lira.hal.errors import ConfigError, PluginError
+from lira.hal.plugins import METHODS as DOOR
 
-Approach = LiraSettings | PlusSettings | HgDaggerSettings | CloningSettings | SwitchingSettings
+
+class OwnSettings(MethodSettings, frozen=True, tag="own"):
+    """A method that does not come with the project: the name by which its settings, or what builds it, are found."""
+
+    name: str
+
+    def build(self, context: Context) -> Method:
+        """Build it. Raises `PluginError` if what comes of that is no method."""
+        method = builder(DOOR.find(self.name, {}), self.name)(context)
+        if not isinstance(method, Method):
+            what = f"'{self.name}' built a {type(method).__name__} and no method"
+            raise PluginError(what, "Let it return a subclass of lira.Method.")
+        return method
+
+    def source(self) -> bytes:
+        """Return the text of the module in which it is."""
+        found = builder(DOOR.find(self.name, {}), self.name)
+        path = getattr(inspect.getmodule(found), "__file__", None)
+        return b"" if path is None else Path(path).read_bytes()
+
+    @property
+    def kind(self) -> str:
+        """Its own name."""
+        return self.name
+
+
+Approach = LiraSettings | PlusSettings | HgDaggerSettings | CloningSettings | SwitchingSettings | OwnSettings
 Sensor = Literal["camera", "lidar"]
 
 
-class Method(msgspec.Struct, frozen=True):
+class Preset(msgspec.Struct, frozen=True):
     """A way of teaching by name.
 
     `trunks`: "frozen" copies of the experts' trunks, or "scratch" (everything is learned). HG-DAgger and cloning know
@@ -36,7 +69,7 @@ class Method(msgspec.Struct, frozen=True):
     name: str
     approach: Approach
     learning: LearningSettings = LearningSettings()
-    trunks: Literal["frozen", "scratch"] = "frozen"
+    trunks: Trunks = "frozen"
     warm: tuple[Sensor, ...] = ()
     mirrored: bool = False
     sharing: SharingSettings | None = None
@@ -46,7 +79,21 @@ class Method(msgspec.Struct, frozen=True):
     @property
     def kind(self) -> str:
         """Which approach it is, in one word."""
-        return str(type(self.approach).__struct_config__.tag)
+        return self.approach.kind
+
+    def starting(self, who: str) -> "Preset":
+        """Return the same with another driver before the first training step. Raises `ConfigError`."""
+        return msgspec.structs.replace(self, approach=self.approach.starting(who))
+
+    def build(self, context: Context) -> Method:
+        """Build the method from what a run has to offer. Raises `ConfigError` or `PluginError`."""
+        method = self.approach.build(context)
+        return method if self.sharing is None else self.sharing.around(method)
+
+
+def file_name(method: str) -> str:
+    """Return a method's name, fit to name a file or a folder."""
+    return re.sub(r"[^\w@-]+", "-", method).strip("-")
 
 
 _HOLD = PRESETS["hold"]
@@ -56,23 +103,23 @@ _M10 = LearningSettings(labels_per_step=10)
 _BOTH: tuple[Sensor, ...] = ("camera", "lidar")
 
 
-def _plus(name: str, **changes: object) -> Method:
+def _plus(name: str, **changes: object) -> Preset:
     """Return `plus` with changes to it."""
-    plus = Method(name, PlusSettings(), _HEAVY, mirrored=True, kernel=KernelSettings(), syllabus=FRESH)
+    plus = Preset(name, PlusSettings(), _HEAVY, mirrored=True, kernel=KernelSettings(), syllabus=FRESH)
     return msgspec.structs.replace(plus, **changes)
 
 
 METHODS = {
     method.name: method
     for method in (
-        Method("hold", _HOLD),
-        Method("thesis", PRESETS["thesis"]),
-        Method("hold-fixed", _HOLD, sharing=SharingSettings(when="fixed")),
-        Method("hold-flexible", _HOLD, sharing=SharingSettings(when="flexible")),
-        Method("thesis-fixed", PRESETS["thesis"], sharing=SharingSettings(when="fixed")),
-        Method("thesis-flexible", PRESETS["thesis"], sharing=SharingSettings(when="flexible")),
-        Method("hold-scratch", _HOLD, trunks="scratch"),
-        Method("hold-mirrored", _HOLD, mirrored=True),
+        Preset("hold", _HOLD),
+        Preset("thesis", PRESETS["thesis"]),
+        Preset("hold-fixed", _HOLD, sharing=SharingSettings(when="fixed")),
+        Preset("hold-flexible", _HOLD, sharing=SharingSettings(when="flexible")),
+        Preset("thesis-fixed", PRESETS["thesis"], sharing=SharingSettings(when="fixed")),
+        Preset("thesis-flexible", PRESETS["thesis"], sharing=SharingSettings(when="flexible")),
+        Preset("hold-scratch", _HOLD, trunks="scratch"),
+        Preset("hold-mirrored", _HOLD, mirrored=True),
         _plus("plus"),
         _plus("plus-no-prefill", approach=PlusSettings(prefill=0)),
         _plus("plus-no-reserve", approach=PlusSettings(reserve_s=0.0)),
@@ -85,27 +132,47 @@ METHODS = {
         _plus("plus-sure", approach=PlusSettings(sure=0.25)),
         _plus("plus-ask", approach=PlusSettings(ask=True)),
         _plus("plus-own", syllabus=THESIS),
-        Method("hg-dagger", _HG, trunks="scratch"),
-        Method("hg-dagger-m10", _HG, _M10, trunks="scratch"),
-        Method("hg-dagger-mirrored", _HG, trunks="scratch", mirrored=True),
-        Method("hg-dagger-doubt", HgDaggerSettings(doubt=("unseen",)), trunks="scratch"),
-        Method("hg-dagger-trunks", _HG),
-        Method("hg-dagger-warm", _HG, warm=_BOTH),
-        Method("hg-dagger-warm-m10", _HG, _M10, warm=_BOTH),
-        Method("hg-dagger-warm-m10-mirrored", _HG, _M10, warm=_BOTH, mirrored=True),
-        Method("hg-dagger-fresh", _HG, trunks="scratch", syllabus=FRESH),
-        Method("hg-dagger-kernel", _HG, _HEAVY, mirrored=True, kernel=KernelSettings(), syllabus=FRESH),
-        Method("hold-kernel", _HOLD, _HEAVY, mirrored=True, kernel=KernelSettings(), syllabus=FRESH),
-        Method("cloning", CloningSettings(), LearningSettings(filter_human=False), trunks="scratch"),
-        Method("switching", SwitchingSettings()),
+        Preset("hg-dagger", _HG, trunks="scratch"),
+        Preset("hg-dagger-m10", _HG, _M10, trunks="scratch"),
+        Preset("hg-dagger-mirrored", _HG, trunks="scratch", mirrored=True),
+        Preset("hg-dagger-doubt", HgDaggerSettings(doubt=("unseen",)), trunks="scratch"),
+        Preset("hg-dagger-trunks", _HG),
+        Preset("hg-dagger-warm", _HG, warm=_BOTH),
+        Preset("hg-dagger-warm-m10", _HG, _M10, warm=_BOTH),
+        Preset("hg-dagger-warm-m10-mirrored", _HG, _M10, warm=_BOTH, mirrored=True),
+        Preset("hg-dagger-fresh", _HG, trunks="scratch", syllabus=FRESH),
+        Preset("hg-dagger-kernel", _HG, _HEAVY, mirrored=True, kernel=KernelSettings(), syllabus=FRESH),
+        Preset("hold-kernel", _HOLD, _HEAVY, mirrored=True, kernel=KernelSettings(), syllabus=FRESH),
+        Preset("cloning", CloningSettings(), LearningSettings(filter_human=False), trunks="scratch"),
+        Preset("switching", SwitchingSettings()),
     )
 }
 ALIASES = {"lira": "hold"}
 
 
-def method_named(name: str) -> Method:
-    """Look a method up. Raises `ConfigError` for a name that is none."""
-    try:
-        return METHODS[ALIASES.get(name, name)]
-    except KeyError:
-        raise ConfigError(f"unknown method '{name}'", f"Known: {', '.join([*ALIASES, *METHODS])}.") from None
+def method_named(name: str) -> Preset:
+    """Look a method up, or load a user's own: MODULE:OBJECT.
+
+    That object is a `Preset`, a `MethodSettings` or a subclass of it, or anything that makes a `Method` of a `Context`,
+    such as a subclass of `Method`. Raises `ConfigError` for a name that is none, `PluginError` if it does not load.
+    """
+    found = DOOR.find(name, {**{alias: METHODS[of] for alias, of in ALIASES.items()}, **METHODS})
+    if isinstance(found, Preset) and found is METHODS.get(found.name):
+        return found
+    builder(found, name)
+    own = OwnSettings(name=name)
+    return msgspec.structs.replace(found, name=name, approach=own) if isinstance(found, Preset) else Preset(name, own)
+
+
+def builder(found: object, name: str) -> Callable[[Context], object]:
+    """Return what builds the method that a plug-in offers under this name. Raises `ConfigError` if nothing does."""
+    if isinstance(found, Preset):
+        found = found.approach
+    if isinstance(found, type) and issubclass(found, MethodSettings):
+        found = found()
+    if isinstance(found, MethodSettings):
+        return found.build
+    if not callable(found):
+        what = f"the method '{name}' is a {type(found).__name__}"
+        raise ConfigError(what, "Give a lira.MethodSettings, or a lira.Method that is made from a lira.Context.")
+    return cast(Callable[[Context], object], found)

@@ -14,11 +14,11 @@ from typing import Literal
 
 import numpy as np
 
-from lira.fusion.learning.novice import Novice
-from lira.fusion.methods.base import Call, Choice, Lesson, Policy, Proposal
+from lira.fusion.methods.base import Call, Choice, Lesson, Method, Policy, Proposal
 from lira.fusion.methods.lira import LiraSpf
 from lira.fusion.preprocess import Features
 from lira.hal.config import Table
+from lira.hal.errors import ConfigError
 from lira.hal.messages import Action
 
 Example = tuple[Action, Sequence[Action], Action]
@@ -32,6 +32,12 @@ class SharingSettings(Table, frozen=True):
     steps: int = 10  # u (assumed)
     fixed_steps: int = 2  # human steps after which `fixed` compares
 
+    def around(self, method: Method) -> Method:
+        """Add it to LIRA-SPF. Raises `ConfigError` for another method."""
+        if not isinstance(method, LiraSpf):
+            raise ConfigError("the shared feedback goes with LIRA-SPF only", "Leave out `sharing`.")
+        return SharedFeedback(method, self)
+
 
 def similar_expert(r: Sequence[Example], limit: float) -> int | None:
     """FeedbackSimilarity: the expert nearer to the human than any other and the novice, and nearer than `limit`."""
@@ -42,19 +48,14 @@ def similar_expert(r: Sequence[Example], limit: float) -> int | None:
     return nearest if nearest < error.size - 1 and error[nearest] < limit else None
 
 
-class SharedFeedback:
+class SharedFeedback(Method):
     """LIRA-SPF, and after a take-over the expert that the human drove like."""
 
     def __init__(self, lira: LiraSpf, settings: SharingSettings) -> None:
-        self._lira = lira
+        self._lira, self.novice, self.experts = lira, lira.novice, lira.experts
         self._settings = settings
         self._limit = (lira.settings.consensus * lira.settings.action_range) ** 2
         self.reset()
-
-    @property
-    def novice(self) -> Novice:
-        """The policy under training."""
-        return self._lira.novice
 
     def reset(self) -> None:
         """R is empty, and nobody has priority."""

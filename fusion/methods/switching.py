@@ -4,24 +4,34 @@
 steps": the camera is then disregarded.
 """
 
-from lira.fusion.methods.base import Choice, Expert, Lesson, Policy, Proposal
+from lira.fusion.methods.base import Choice, Expert, Method, Proposal
+from lira.fusion.methods.context import Context, MethodSettings
 from lira.fusion.preprocess import Features
-from lira.hal.config import Table
-from lira.hal.messages import Action, ExpertView
+from lira.hal.messages import ExpertView
 
 
-class SwitchingSettings(Table, frozen=True, tag="switching"):
+class SwitchingSettings(MethodSettings, frozen=True, tag="switching"):
     """The thesis names neither number (both assumed)."""
 
     near_m: float = 1.0  # the lidar expert takes over when something is nearer than this
     steps: int = 5  # and drives at least so long
 
+    @property
+    def learns(self) -> bool:
+        """Nobody learns."""
+        return False
 
-class Switching:
+    def build(self, context: Context) -> Method:
+        """Switch between the camera's and the lidar's expert."""
+        camera, lidar, *_ = context.experts
+        return Switching(camera, lidar, self, context.profile.features.max_range_m)
+
+
+class Switching(Method):
     """The camera expert drives, and the lidar expert where something is near. `max_range_m` is that of the features."""
 
     def __init__(self, camera: Expert, lidar: Expert, settings: SwitchingSettings, max_range_m: float) -> None:
-        self._camera, self._lidar = camera, lidar
+        self._camera, self._lidar = self.experts = camera, lidar
         self._settings = settings
         self._near = settings.near_m / max_range_m
         self.reset()
@@ -29,9 +39,6 @@ class Switching:
     def reset(self) -> None:
         """The camera expert begins."""
         self._left = 0
-
-    def update(self, now_s: float) -> None:
-        """Nothing to adopt."""
 
     def propose(self, features: Features) -> Proposal:
         """One of the experts drives, and nobody is called."""
@@ -44,11 +51,3 @@ class Switching:
         )
         action = next(view.action for view in views if view.active)
         return Proposal(features, Choice(driver.name, action), experts=views)
-
-    def learn(self, proposal: Proposal, human: Action | None) -> Lesson:
-        """Learn nothing; a human may still take over."""
-        return Lesson(proposal.choice if human is None else Choice("human", human))
-
-    def policy(self, driver: str) -> Policy:
-        """The policy behind a driver's name."""
-        return {expert.name: expert.act for expert in (self._camera, self._lidar)}[driver]

@@ -7,7 +7,6 @@ from typing import Literal, Protocol
 import numpy as np
 
 from lira.fusion.control import HELD, ControlLoop, Step, Teacher
-from lira.fusion.learning.novice import Novice
 from lira.fusion.log.recorder import Journal
 from lira.fusion.log.run_log import LapRecord, ResultRecord
 from lira.fusion.methods.base import Alone, Call, Method
@@ -19,14 +18,6 @@ PUT_BACK_M = 2.0  # after a crash in training the robot starts again this far be
 PUT_ON_M = 1.0  # and on an unseen layout this far behind it
 LOST_OBSERVATIONS = 50  # unusable observations in a row that end a session
 BLIND_M = 0.3  # so close to a box the camera may see nothing but that: a crash, and no broken sensor
-
-
-class Apprentice(Method, Protocol):
-    """A method that trains a novice."""
-
-    @property
-    def novice(self) -> Novice:
-        """The policy under training."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -105,7 +96,7 @@ class Session:
         arena: Arena,
         loop: ControlLoop,
         journal: Journal,
-        apprentice: Apprentice | None,
+        apprentice: Method | None,
         alone: Callable[[str], Method] | None = None,
     ) -> None:
         self._robot = robot
@@ -117,7 +108,7 @@ class Session:
         self._began_s = robot.now()
         self._laps = 0
 
-    def teach(self, course: Course, teacher: Teacher, laps: int, *, all_laps: bool = False) -> bool:
+    def teach(self, course: Course, teacher: Teacher | None, laps: int, *, all_laps: bool = False) -> bool:
         """Train until the novice passes every proving run that follows a training lap, or through `all_laps` anyway.
 
         Returns whether the last ones were passed; False if `laps` were not enough.
@@ -168,7 +159,7 @@ class Session:
         )
 
     @property
-    def _pupil(self) -> Apprentice:
+    def _pupil(self) -> Method:
         if self._apprentice is None:
             raise ValueError("there is nobody to teach")
         return self._apprentice

@@ -1,8 +1,11 @@
 """A robot, and its arena, at the other end of the bus."""
 
+from collections.abc import Iterator
+from contextlib import contextmanager
+
 import msgspec
 
-from lira.hal.bus.bus import Bus
+from lira.hal.bus.bus import CLOSE_S, DEFAULT_ENDPOINT, DEFAULT_ROBOT, Bus
 from lira.hal.bus.services import LOCKSTEP, Info, info_from_json, reset_time
 from lira.hal.bus.topics import INFO, RESET
 from lira.hal.client.lockstep import LockstepLink
@@ -52,6 +55,11 @@ class RemoteRobot:
     def profile(self) -> RobotProfile:
         """The robot's profile, as it sent it. Raises `BusError` before `open`."""
         return self.info.profile
+
+    @property
+    def arena(self) -> "RemoteArena | None":
+        """What a twin can do and a floor cannot; None for a robot on a floor. Raises `BusError` before `open`."""
+        return None if bytes(self.info.arena) == b"null" else RemoteArena(self)
 
     def open(self) -> None:
         """Find the robot. Raises `BusError` if nobody answers."""
@@ -106,6 +114,25 @@ class RemoteRobot:
         if self._link is not None:
             self._link.close()
             self._link = None
+
+
+@contextmanager
+def connect(
+    address: str = DEFAULT_ENDPOINT, name: str = DEFAULT_ROBOT, *, close_s: float = CLOSE_S
+) -> Iterator[RemoteRobot]:
+    """Open the robot `name` that listens at `address` (HOST:PORT); in the end say stop, and leave it running.
+
+    Leaving a link that is dead takes `close_s` at most. Raises `BusError` if nobody answers. Keys are those that
+    LIRA_KEYS names.
+    """
+    bus = Bus(name, connect=address)
+    robot = RemoteRobot(bus)
+    try:
+        robot.open()
+        yield robot
+    finally:
+        robot.close()
+        bus.close(close_s)
 
 
 class RemoteArena:

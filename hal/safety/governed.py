@@ -2,6 +2,8 @@
 
 import math
 import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import replace
 
 import msgspec
@@ -172,3 +174,14 @@ def _without_field(profile: RobotProfile, absent: tuple[str, ...]) -> tuple[Robo
     if profile.field is None or "lidar" not in absent:
         return profile, ""
     return msgspec.structs.replace(profile, field=None), FIELD_OFF
+
+
+@contextmanager
+def govern(robot: Robot) -> Iterator[GovernedRobot]:
+    """Open a raw robot behind a governor of its own, and close it in the end: what drives it here cannot go too far."""
+    governed = GovernedRobot(robot)
+    try:
+        governed.open()
+        yield governed
+    finally:
+        governed.close()

@@ -20,7 +20,7 @@ from lira.hal.safety.governed import GovernedRobot
 from lira.sim_backend.catalogue import load_world
 from lira.sim_backend.twin import Twin
 from lira.tools.launch.processes import ChildProcess, lira_command
-from lira.tools.runs.build import apprentice, lap, teacher
+from lira.tools.runs.build import build_method, lap, teacher
 
 WORLD = """
 description = "A short straight line with one box on it"
@@ -110,7 +110,7 @@ def test_in_process_gives_the_same_decisions_as_over_the_bus(demos, world, one_t
     twin = Twin(profile, floor)
     robot = GovernedRobot(twin)
     robot.open()
-    method = apprentice(METHODS["hold"], profile, 0, partial(ProcessTrainer, adopt_after_s=profile.period_s))
+    method = build_method(METHODS["hold"], profile, 0, partial(ProcessTrainer, adopt_after_s=profile.period_s))
     try:
         with RunWriter(tmp_path / "run.jsonl") as record, DemonstrationLog(tmp_path / "labels.lira", profile) as log:
             loop = ControlLoop(robot, truth=twin.state)
@@ -118,7 +118,7 @@ def test_in_process_gives_the_same_decisions_as_over_the_bus(demos, world, one_t
             loop.arm()
             session.teach(Same([lap(profile, floor, 0)]), teacher(SKILLED, profile, floor, 0, 0), LAPS)
     finally:
-        method.novice.close()
+        method.close()
         robot.close()
 
     def decisions(path):

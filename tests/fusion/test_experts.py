@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from lira.fusion.experts.files import folder_of
-from lira.fusion.experts.load import as_expert, load_alone, load_expert, load_network
+from lira.fusion.experts.load import as_expert, load_alone, load_network, load_policy
 from lira.fusion.experts.tasks import DEFAULT, TASKS, task_of
 from lira.fusion.methods.base import Alone
 from lira.fusion.methods.doubt import Doubtful
@@ -25,7 +25,7 @@ def save(path, kind, network, bins, filters, profile="rosbot2", cruise=None):
 
 @pytest.mark.parametrize("name", ["camera", "lidar"])
 def test_the_experts_that_come_with_the_project_load_by_name(name):
-    expert = load_expert(f"{name}-expert", SIM)
+    expert = load_policy(f"{name}-expert", SIM)
     assert expert.name == name
     assert expert.cruise[0] > 0.9  # at full speed
     assert abs(expert.cruise[1]) < 0.1  # straight on
@@ -40,7 +40,7 @@ def test_the_experts_that_come_with_the_project_load_by_name(name):
 @pytest.mark.parametrize("name", ["camera", "lidar"])
 def test_every_task_has_its_experts_for_its_robot(task, name):
     profile = load_profile(TASKS[task].profile)
-    assert load_expert(f"{name}-expert", profile, task).name == name
+    assert load_policy(f"{name}-expert", profile, task).name == name
     _, checkpoint = load_network(name, profile, task)
     owner = TASKS[task].lidar if name == "lidar" else task
     words = "" if owner == DEFAULT else f" --task {owner}"
@@ -62,12 +62,12 @@ def test_the_experts_of_a_world_are_those_of_its_task():
 def test_a_pair_of_ones_own_is_a_folder(tmp_path):
     for kind, network in (("camera", CameraNet(16)), ("lidar", LidarNet(101))):
         save(tmp_path / f"{kind}.safetensors", kind, network, 101, 16, cruise=(0.9, 0.01))
-        assert load_expert(f"{kind}-expert", SIM, str(tmp_path)).cruise == (0.9, 0.01)
+        assert load_policy(f"{kind}-expert", SIM, str(tmp_path)).cruise == (0.9, 0.01)
 
 
 def test_a_folder_without_the_expert_says_how_to_make_it(tmp_path):
     with pytest.raises(ConfigError, match=r"no lidar expert .*lidar.safetensors.*lira train-expert lidar .*--out"):
-        load_expert("lidar-expert", SIM, str(tmp_path))
+        load_policy("lidar-expert", SIM, str(tmp_path))
 
 
 def test_a_seeded_pair_has_a_folder_of_its_own():
@@ -82,17 +82,17 @@ def test_a_seeded_pair_of_no_task_is_refused(pair):
 
 def test_an_unknown_name_lists_the_known_ones():
     with pytest.raises(ConfigError, match=r"unknown policy 'sonar-expert'.*camera-expert, lidar-expert.*safetensors"):
-        load_expert("sonar-expert", SIM)
+        load_policy("sonar-expert", SIM)
 
 
 def test_a_profile_without_an_expert_says_how_to_train_one():
     with pytest.raises(ConfigError, match=r"'rosbot2'.*lira train-expert camera --profile rosbot2"):
-        load_expert("camera-expert", REAL)
+        load_policy("camera-expert", REAL)
 
 
 def test_a_file_of_ones_own_is_named_after_its_sensor(tmp_path):
     path = save(tmp_path / "mine.safetensors", "lidar", LidarNet(130, seed=1), 130, 32, cruise=(0.9, 0.01))
-    expert = load_expert(path, REAL)
+    expert = load_policy(path, REAL)
     assert (expert.name, expert.cruise) == ("lidar", (0.9, 0.01))
 
 
@@ -108,12 +108,12 @@ def test_the_checkpoint_of_another_robot_is_refused_with_both_names(tmp_path, ne
 
 def test_what_an_expert_does_not_see_may_differ(tmp_path):
     path = save(tmp_path / "camera.safetensors", "camera", CameraNet(16), 130, 16)
-    assert load_expert(path, SIM).name == "camera"
+    assert load_policy(path, SIM).name == "camera"
 
 
 def test_a_missing_file_is_one_clear_error(tmp_path):
     with pytest.raises(StorageError, match="there is no checkpoint"):
-        load_expert(str(tmp_path / "none.safetensors"), SIM)
+        load_policy(str(tmp_path / "none.safetensors"), SIM)
 
 
 def test_an_expert_is_a_black_box_that_sees_both_sensors():

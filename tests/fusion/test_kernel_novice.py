@@ -9,7 +9,7 @@ import torch
 from lira.fusion.learning.kernel_novice import KernelNovice
 from lira.fusion.learning.labels import Label, mirror
 from lira.fusion.learning.novice import LearningSettings
-from lira.fusion.policies.checkpoint import Checkpoint, build, load_checkpoint, save_checkpoint
+from lira.fusion.policies.checkpoint import Checkpoint, load_checkpoint, save_checkpoint
 from lira.fusion.policies.kernel import KernelSettings
 from lira.fusion.policies.kernel_net import KernelNet
 from lira.fusion.policies.networks import CameraNet, LidarNet
@@ -165,9 +165,12 @@ class TestFile:
         assert back.act(seen(3).scan, seen(3).image) == network.act(seen(3).scan, seen(3).image)
 
     @pytest.mark.parametrize("examples", [-1, 10**9])
-    def test_a_number_of_examples_that_nobody_has_taught_is_refused(self, examples):
-        with pytest.raises(ValueError, match=f"a kernel of {examples} examples"):
-            build(Checkpoint("kernel", BINS, FILTERS, "thesis-sim", None, "lira demo", 0, examples=examples))
+    def test_a_number_of_examples_that_nobody_has_taught_is_refused(self, tmp_path, examples):
+        path = tmp_path / "novice.safetensors"
+        about = Checkpoint("kernel", BINS, FILTERS, "thesis-sim", None, "lira demo", 0, examples=examples)
+        save_checkpoint(path, taught().frozen(), about)
+        with pytest.raises(StorageError, match=r"does not hold what it says.*examples"):
+            load_checkpoint(path)
 
     def test_one_that_was_taught_nothing_stands(self, tmp_path):
         back, _ = load_checkpoint(self.saved(tmp_path, novice().frozen()))

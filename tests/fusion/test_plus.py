@@ -5,7 +5,7 @@ import pytest
 
 from lira.fusion.learning.novice import LearningSettings, NetworkNovice
 from lira.fusion.log.recorder import Journal
-from lira.fusion.methods.base import Call, Chooser, Expert
+from lira.fusion.methods.base import Alone, Call, Chooser, Expert
 from lira.fusion.methods.lira import LiraSettings, LiraSpf
 from lira.fusion.methods.plus import LiraPlus, PlusSettings
 from lira.fusion.policies.networks import FusionNet
@@ -228,3 +228,15 @@ def test_a_novice_that_cannot_tell_is_never_sure():
     scene.warm()
     scene.camera, scene.lidar = LEFT, RIGHT
     assert scene.step()[0].choice.call is Call.FEEDBACK
+
+
+def test_it_asks_on_unseen_layouts_only_and_only_if_it_is_told_to():
+    silent, asking = Scene(BARE), Scene(PlusSettings(ask=True))
+    assert not silent.method.calls_alone
+    assert asking.method.calls_alone
+    for scene, phase in ((silent, "prove"), (silent, "unseen"), (asking, "prove")):
+        assert isinstance(scene.method.alone(phase), Alone)
+    asking.novice.doubts = lambda features: features.scan.min() < 0.5
+    alone = asking.method.alone("unseen")
+    assert alone.propose(seen()).choice.call is Call.NONE
+    assert alone.propose(seen(nearness=0.2)).choice.call is Call.FEEDBACK

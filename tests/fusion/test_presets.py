@@ -3,7 +3,7 @@ import pytest
 
 from lira.fusion.methods.hg_dagger import HgDaggerSettings
 from lira.fusion.methods.lira import LiraSettings
-from lira.fusion.methods.presets import ALIASES, METHODS, Method, method_named
+from lira.fusion.methods.presets import ALIASES, METHODS, Preset, method_named
 from lira.fusion.methods.syllabus import FRESH
 from lira.hal.errors import ConfigError
 
@@ -11,7 +11,7 @@ from lira.hal.errors import ConfigError
 def test_every_method_goes_through_json_as_it_is():
     for name, method in METHODS.items():
         assert method.name == name
-        assert msgspec.json.decode(msgspec.json.encode(method), type=Method) == method
+        assert msgspec.json.decode(msgspec.json.encode(method), type=Preset) == method
     assert len({msgspec.json.encode(method) for method in METHODS.values()}) == len(METHODS)
 
 

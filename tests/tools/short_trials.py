@@ -5,7 +5,7 @@ import msgspec
 from lira.fusion.methods.hg_dagger import HgDaggerSettings
 from lira.fusion.methods.lira import PRESETS
 from lira.fusion.teaching.teacher import PERFECT
-from lira.tools.experiments.trial import Method, Trial
+from lira.tools.experiments.trial import Preset, Trial
 
 SHORT = """
 description = "Ten metres of line with one box on it"
@@ -27,7 +27,7 @@ def write_world(folder):
 
 
 def short_trial(world, *, seed=0, name="hold", lira=PRESETS["hold"]):
-    method = Method(name, lira or HgDaggerSettings())
+    method = Preset(name, lira or HgDaggerSettings())
     return Trial(method, world, seed, teacher="perfect", skill=PERFECT, laps=1, unseen=1)
 
 

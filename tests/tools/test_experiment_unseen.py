@@ -4,11 +4,12 @@ import msgspec
 import pytest
 from made_up_outcomes import lap, outcome
 
+from lira.fusion.methods import presets
 from lira.fusion.methods.syllabus import Syllabus
 from lira.tools.experiments.registry import REGISTRY, load
 from lira.tools.experiments.studies import unseen
 from lira.tools.experiments.summary import read_summary, summarise, to_json
-from lira.tools.verbs.experiment import chosen_methods
+from lira.tools.verbs.experiment import chosen_methods, own_trials
 
 
 def run(method, seed, *, labels=20, passed=12, converged=True, collisions=0, experts=None):
@@ -76,3 +77,18 @@ def test_a_proof_of_ones_own_stays_with_what_a_method_is():
     method = unseen.to_quality("plus")
     assert method.syllabus == Syllabus("fresh", 12, 1)
     assert unseen.to_quality("hg-dagger").syllabus == Syllabus("own", 12, 1)
+
+
+def test_a_method_of_ones_own_is_taught_on_the_layouts_of_plus_and_shown_last(monkeypatch):
+    monkeypatch.setattr(presets, "method_named", lambda name: presets.Preset(name, presets.OwnSettings(name=name)))
+    listed = load("unseen").trials(2)
+    trials = own_trials(["lab:Mine"], listed, load("unseen"), "unseen")
+    assert [(trial.seed, trial.method.name) for trial in trials] == [(0, "lab:Mine"), (1, "lab:Mine")]
+    assert {trial.method.syllabus for trial in trials} == {unseen.to_quality("plus").syllabus}
+    played = [run("plus", seed, labels=30) for seed in range(4)]
+    trial = msgspec.structs.replace(played[0].trial, method=trials[0].method)
+    mine = [
+        msgspec.structs.replace(each, trial=msgspec.structs.replace(trial, seed=each.trial.seed)) for each in played
+    ]
+    assert [row["method"] for row in unseen.quality([*mine, *outcomes()])] == ["plus", "hg-dagger", "lab:Mine"]
+    assert {row["against"] for row in unseen.ratios([*mine, *outcomes()])} == {"hg-dagger", "lab:Mine"}

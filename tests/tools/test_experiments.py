@@ -73,5 +73,7 @@ def test_an_outcome_that_is_damaged_is_named(world, tmp_path):
 def test_the_command_refuses_what_makes_no_sense(capsys):
     assert main(["experiment", "table2", "--seeds", "0"]) == 2
     assert "at least 1" in capsys.readouterr().err
-    with pytest.raises(SystemExit):
-        main(["experiment", "table9"])
+    assert main(["experiment", "table9"]) == 2
+    what, remedy = capsys.readouterr().err.splitlines()
+    assert what == "lira experiment: unknown experiment 'table9'"
+    assert "table2, race" in remedy

@@ -5,23 +5,18 @@ from itertools import pairwise
 
 import pytest
 
-from lira.fusion.control import ControlLoop
-from lira.fusion.experts.load import load_expert
-from lira.fusion.learning.learner import Learner
-from lira.fusion.learning.novice import LearningSettings, NetworkNovice
 from lira.fusion.learning.trainer import InlineTrainer
 from lira.fusion.log.recorder import Journal
 from lira.fusion.log.run_log import RunRecord, RunWriter, read_run
-from lira.fusion.methods.base import Expert
-from lira.fusion.methods.lira import PRESETS, LiraSpf
-from lira.fusion.policies.networks import FusionNet
+from lira.fusion.methods.presets import METHODS
 from lira.hal.profile import load_profile
-from lira.hal.safety.governed import GovernedRobot
-from lira.sim_backend.twin import Twin
 from lira.tools.console import draw
 from lira.tools.console.sample import sample_view
 from lira.tools.report import write_report
 from lira.tools.report.digest import load_run
+from lira.tools.runs.build import build_method
+from lira.tools.runs.script import drive
+from lira.tools.runs.simulated import simulate
 
 PROFILE = load_profile("thesis-sim")
 STEPS = 60
@@ -35,24 +30,13 @@ def wall(seen):
 @pytest.fixture(scope="module")
 def record(tmp_path_factory):
     path = tmp_path_factory.mktemp("three") / "run.jsonl"
-    experts = [load_expert("camera-expert", PROFILE), load_expert("lidar-expert", PROFILE), Expert("wall", wall)]
-    network = FusionNet(PROFILE.features.bins, PROFILE.features.filters)
-    novice = NetworkNovice(network, InlineTrainer(Learner(network, seed=0, frozen_trunks=False)), LearningSettings())
-    novice.training_steps = 1
-    method = LiraSpf(experts, novice, PRESETS["hold"], PROFILE.period_s)
-    twin = Twin(PROFILE, "line-obstacles", renderer="tiny")
-    robot = GovernedRobot(twin)
-    robot.open()
-    try:
-        with RunWriter(path) as writer:
-            writer.write(RunRecord("line-obstacles", PROFILE.name, "lira", "hold", 0, 0, "lira", "0"))
-            journal, loop = Journal(write=writer.write), ControlLoop(robot, truth=twin.state)
-            loop.arm()
-            for _ in range(STEPS):
-                step = loop.step(method)
-                journal.note(step, phase="train", lap=1, layout=0, training_steps=1)
-    finally:
-        robot.close()
+    method = build_method(METHODS["hold-scratch"], PROFILE, 0, InlineTrainer, more=[wall])
+    method.novice.training_steps = 1  # as if it had been taught: before that a human is asked to drive
+    with simulate("line-obstacles", renderer="tiny") as robot, RunWriter(path) as writer:
+        writer.write(RunRecord("line-obstacles", PROFILE.name, "lira", "hold", 0, 0, "lira", "0"))
+        journal = Journal(write=writer.write)
+        for step in drive(robot, method, steps=STEPS):
+            journal.note(step, phase="train", lap=1, layout=0, training_steps=1)
     return path
 
 

@@ -13,7 +13,6 @@ from functools import partial
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
-import msgspec
 import torch
 
 from lira.fusion.control import ControlLoop
@@ -21,15 +20,14 @@ from lira.fusion.learning.trainer import ProcessTrainer
 from lira.fusion.log.label_log import DemonstrationLog
 from lira.fusion.log.recorder import Journal
 from lira.fusion.log.run_log import RunWriter
+from lira.fusion.methods.base import Method
 from lira.fusion.methods.presets import METHODS
-from lira.fusion.teaching.session import Apprentice
-from lira.hal.bus.bus import Bus
 from lira.hal.bus.topics import DECISION
-from lira.hal.client.remote import RemoteArena, RemoteRobot
+from lira.hal.client.remote import RemoteArena, RemoteRobot, connect
 from lira.hal.messages import Episode
 from lira.tools.bench import Row
 from lira.tools.launch.processes import ChildProcess, free_port, lira_command
-from lira.tools.runs.build import apprentice
+from lira.tools.runs.build import build_method
 
 RUNS = 3
 WORLD = "race"
@@ -58,22 +56,15 @@ def measure(layout: int) -> dict[str, float]:
         ChildProcess("the twin", lira_command("twin", *words), Path(folder) / "twin.log") as twin,
     ):
         twin.wait_ready("serves world", READY_S)
-        bus = Bus(name, connect=endpoint)
-        robot = RemoteRobot(bus)
-        try:
-            robot.open()
+        with connect(endpoint, name) as robot:
             return drive(robot, layout, Path(folder))
-        finally:
-            robot.close()
-            bus.close()
 
 
 def drive(robot: RemoteRobot, layout: int, folder: Path) -> dict[str, float]:
     """Let LIRA-SPF drive and learn: first to warm up, then timed."""
     profile = robot.profile
-    hold = METHODS["hold"]
-    begun = msgspec.structs.replace(hold, approach=msgspec.structs.replace(hold.approach, start="experts"))
-    method = apprentice(begun, profile, layout, partial(ProcessTrainer, adopt_after_s=profile.period_s))
+    begun = METHODS["hold"].starting("experts")
+    method = build_method(begun, profile, layout, partial(ProcessTrainer, adopt_after_s=profile.period_s))
     decisions = robot.bus.publisher(DECISION)
     try:
         with DemonstrationLog(folder / "labels.lira", profile) as log, RunWriter(folder / "run.jsonl") as record:
@@ -87,7 +78,7 @@ def drive(robot: RemoteRobot, layout: int, folder: Path) -> dict[str, float]:
             drive_until(WARM_UP_S + SIMULATED_S, robot, layout, loop, method, journal)
             took_s, simulated_s = time.perf_counter() - began[0], robot.now() - began[1]
     finally:
-        method.novice.close()
+        method.close()
     return {
         "real_time_factor": simulated_s / took_s,
         "steps": round(simulated_s / profile.period_s),
@@ -101,7 +92,7 @@ def drive_until(
     robot: RemoteRobot,
     layout: int,
     loop: ControlLoop,
-    method: Apprentice,
+    method: Method,
     journal: Journal,
 ) -> None:
     """Drive until the robot's clock says so; after a crash or at the end it is put down anew."""

@@ -5,10 +5,8 @@ import time
 
 import msgspec
 
-from lira.hal.bus.bus import Bus
 from lira.hal.profile import RobotProfile, load_profile
-from lira.hal.safety.governed import GovernedRobot
-from lira.hal.server.server import HalServer, stop_on_signal
+from lira.hal.server.serve import serve
 from lira.hal.testing import NullRobot
 
 READY = "null robot serves"
@@ -23,13 +21,7 @@ def profile_at(scan_hz: float) -> RobotProfile:
 def main(name: str, endpoint: str, scan_hz: float) -> None:
     """Serve in real time until SIGTERM."""
     robot = NullRobot(profile_at(scan_hz), time.monotonic, time.sleep)
-    bus = Bus(name, listen=endpoint)
-    try:
-        with stop_on_signal() as stop:
-            server = HalServer(GovernedRobot(robot), bus, robot, ready=lambda: print(f"{READY} {name}", flush=True))
-            server.run(stop)
-    finally:
-        bus.close()
+    serve(robot, name, endpoint, arena=robot, ready=lambda *_: print(f"{READY} {name}", flush=True))
 
 
 if __name__ == "__main__":

@@ -1,6 +1,7 @@
 """What an experiment is: trials to run and, of what came of them, tables, figures and findings.
 
-A new experiment is a module with `EXPERIMENTS = {name: Experiment(...)}` and a line in `registry`.
+A new experiment is a module with `EXPERIMENTS = {name: Experiment(...)}` and a line in `registry`; one of your own lies
+where you like, and `lira experiment MODULE:OBJECT` plays it.
 """
 
 from collections.abc import Callable, Sequence
@@ -60,7 +61,7 @@ class Experiment:
     `quantity`, `median`, `low`, `high`, `n`, `censored`, for experiments that compare methods pair by pair, and
     `quality` rows of `method`, `pair`, effort and unseen laps passed, for those that ask how good the novices are.
     `methods` are those of which some may be played alone, and `usual` those that are if nothing is said; none where
-    only all together say something.
+    only all together say something. `words` says what it shows, where the registry does not.
     """
 
     trials: Callable[[int], list[Trial]]
@@ -71,3 +72,4 @@ class Experiment:
     quality: Callable[[Outcomes], list[Row]] = lambda _: []
     methods: tuple[str, ...] = ()
     usual: tuple[str, ...] = ()
+    words: str = ""

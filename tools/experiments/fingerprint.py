@@ -18,16 +18,18 @@ START = "lira.tools.experiments.trial"
 
 
 @cache
-def fingerprint(world: str, pair: str) -> str:
+def fingerprint(world: str, pair: str, source: bytes = b"") -> str:
     """Return 16 hex digits that change with anything a trial here, with these experts, could come out differently for.
 
     Of the code, what `START` imports counts: what each file does, not where it lies nor what it imports, so that moving
-    modules changes nothing. The robot is that of the world's task. Raises `ConfigError` if an expert is not there.
+    modules changes nothing; of a method of somebody's own its `source`. The robot is that of the world's task.
+    Raises `ConfigError` if an expert is not there.
     """
     profile = load_profile(TASKS[task_of(world)].profile)
     parts = sorted(filter(None, (code(path) for path in sources(START))))
     parts += [msgspec.json.encode(each) for each in (load_world(world), profile)]
     parts += [expert_path(name, profile, pair).read_bytes() for name in SHIPPED]
+    parts += [source] if source else []
     return hashlib.sha256(b"".join(hashlib.sha256(part).digest() for part in parts)).hexdigest()[:16]
 
 

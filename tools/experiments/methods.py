@@ -5,11 +5,11 @@ Here all are taught and proven on one layout, as in the thesis, also those that 
 
 from msgspec.structs import replace
 
-from lira.fusion.methods.presets import METHODS, Method
+from lira.fusion.methods.presets import METHODS, Preset
 from lira.fusion.methods.syllabus import THESIS
 
 
-def as_in_the_thesis(name: str) -> Method:
+def as_in_the_thesis(name: str) -> Preset:
     """A method that is taught and proven on its own layout."""
     return replace(METHODS[name], syllabus=THESIS)
 

@@ -1,7 +1,13 @@
-"""The one list of experiments. Without heavy imports: a module is loaded when its experiment is asked for."""
+"""The one list of experiments, and the door to a user's own.
+
+Without heavy imports: a module is loaded when its experiment is asked for.
+"""
 
 import importlib
 from typing import TYPE_CHECKING, NamedTuple
+
+from lira.hal.errors import ConfigError
+from lira.hal.plugins import EXPERIMENTS
 
 if TYPE_CHECKING:
     from lira.tools.experiments.experiment import Experiment
@@ -35,7 +41,21 @@ REGISTRY = {
 
 
 def load(name: str) -> "Experiment":
-    """Import an experiment. Raises `KeyError` for a name that is not in the registry."""
-    module = importlib.import_module(f"lira.tools.experiments.studies.{REGISTRY[name].module}")
-    experiment: Experiment = module.EXPERIMENTS[name]
-    return experiment
+    """Import an experiment: one of the registry, or a user's own.
+
+    Raises `ConfigError` for a name that is none, and `PluginError` for one that does not load.
+    """
+    from lira.tools.experiments.experiment import Experiment
+
+    found = EXPERIMENTS.find(name, REGISTRY)
+    if isinstance(found, Entry):
+        found = importlib.import_module(f"lira.tools.experiments.studies.{found.module}").EXPERIMENTS[name]
+    if not isinstance(found, Experiment):
+        what = f"the experiment '{name}' is a {type(found).__name__}"
+        raise ConfigError(what, "Give a lira.tools.experiments.experiment.Experiment.")
+    return found
+
+
+def words_of(name: str, experiment: "Experiment") -> str:
+    """Say in a line what an experiment shows."""
+    return REGISTRY[name].words if name in REGISTRY else experiment.words

@@ -22,7 +22,7 @@ def run_trials(trials: Sequence[Trial], folder: Path, pool: Pool) -> list[Outcom
 
     An outcome of other code or other experts is played again. Progress goes to standard error. Raises `StorageError`.
     """
-    prints = {trial: fingerprint(trial.world, trial.pair) for trial in trials}
+    prints = {trial: fingerprint(trial.world, trial.pair, trial.method.approach.source()) for trial in trials}
     done: dict[Trial, Outcome] = {}
     outdated = 0
     for trial in trials:

@@ -6,22 +6,21 @@ from pathlib import Path
 
 import msgspec
 
-from lira.fusion.control import ControlLoop
 from lira.fusion.experts.tasks import TASKS, task_of
 from lira.fusion.learning.trainer import InlineTrainer
 from lira.fusion.log.recorder import Journal
 from lira.fusion.log.run_log import LapRecord, ResultRecord
-from lira.fusion.methods.presets import Method as Method
-from lira.fusion.teaching.session import Session
+from lira.fusion.methods.presets import Preset as Preset
+from lira.fusion.methods.presets import file_name
 from lira.fusion.teaching.teacher import SKILLED, TeacherSettings
 from lira.hal.messages import Action
 from lira.hal.profile import RobotProfile, load_profile
-from lira.hal.safety.governed import GovernedRobot
 from lira.sim_backend.catalogue import load_world
 from lira.sim_backend.foresight import sketching
-from lira.sim_backend.twin import Twin
 from lira.tools.experiments.notes import Notes, Track
-from lira.tools.runs.build import Course, crew, teacher
+from lira.tools.runs.build import build_method, teacher
+from lira.tools.runs.course import Course, run_course
+from lira.tools.runs.simulated import simulate
 
 UNSEEN = 1000  # layouts from here on belong to nobody's training
 
@@ -29,7 +28,7 @@ UNSEEN = 1000  # layouts from here on belong to nobody's training
 class Trial(msgspec.Struct, frozen=True):
     """What is run. Trials with one seed share layout and teacher stream, whatever the method."""
 
-    method: Method
+    method: Preset
     world: str
     seed: int
     teacher: str = "scripted"
@@ -58,7 +57,7 @@ class Trial(msgspec.Struct, frozen=True):
     def file(self) -> str:
         """Name of the file that keeps its outcome: readable, and different for whatever is set differently."""
         digest = hashlib.sha256(msgspec.json.encode(self)).hexdigest()[:8]
-        return f"{Path(self.world).stem}-{self.method.name}-{self.teacher}-{self.seed}-{digest}.json"
+        return f"{Path(self.world).stem}-{file_name(self.method.name)}-{self.teacher}-{self.seed}-{digest}.json"
 
 
 class Outcome(msgspec.Struct, frozen=True):
@@ -87,24 +86,21 @@ def play(trial: Trial) -> Outcome:
     torch.set_num_threads(1)
     profile, world = trial.profile, load_world(trial.world)
     notes = Notes()
-    twin = Twin(sketching(profile), world, layout=trial.seed, seed=trial.seed, renderer="tiny")
-    robot = GovernedRobot(twin)
-    robot.open()
-    team = crew(trial.method, profile, trial.seed, InlineTrainer, trial.pair)
-    try:
-        loop = ControlLoop(robot, truth=twin.state)
-        session = Session(robot, twin, loop, Journal(keep=notes.label, write=notes.record), team.pupil, team.alone)
-        loop.arm()
-        course = Course(profile, world, trial.seed, trial.method.syllabus)
-        unseen = course.unseen(UNSEEN + trial.seed * trial.unseen, trial.unseen)
-        with closing(teacher(trial.skill, profile, world, trial.seed, trial.seed)) as hand:
-            if team.pupil is None:
-                converged = session.prove(course)
-            else:
-                converged = session.teach(course, hand, trial.laps, all_laps=trial.all_laps)
-            session.show(unseen, hand if team.answered else None)
-        result = session.result(converged, trial.method.syllabus.proof)
-        return Outcome(trial, tuple(notes.laps), result, notes.labels, notes.tracks)
-    finally:
-        team.close()
-        robot.close()
+    first = UNSEEN + trial.seed * trial.unseen
+    course = Course(
+        profile,
+        world,
+        trial.seed,
+        trial.method.syllabus,
+        trial.laps,
+        trial.all_laps,
+        unseen=range(first, first + trial.unseen),
+    )
+    with (
+        simulate(world, sketching(profile), layout=trial.seed, seed=trial.seed, renderer="tiny") as robot,
+        closing(build_method(trial.method, profile, trial.seed, InlineTrainer, trial.pair)) as method,
+        closing(teacher(trial.skill, profile, world, trial.seed, trial.seed)) as hand,
+    ):
+        journal = Journal(keep=notes.label, write=notes.record)
+        result = run_course(robot, robot.arena, method, hand, journal, course)
+    return Outcome(trial, tuple(notes.laps), result, notes.labels, notes.tracks)

@@ -15,7 +15,6 @@ from lira.fusion.learning.learner import Learner
 from lira.fusion.learning.novice import LearningSettings, NetworkNovice
 from lira.fusion.learning.trainer import InlineTrainer
 from lira.fusion.log.recorder import Journal
-from lira.fusion.log.run_log import Record
 from lira.fusion.methods.base import Alone
 from lira.fusion.methods.hg_dagger import HgDagger
 from lira.fusion.policies.checkpoint import Checkpoint, save_checkpoint
@@ -26,11 +25,10 @@ from lira.fusion.teaching.teacher import ScriptedTeacher
 from lira.hal.errors import LiraError
 from lira.hal.messages import Action
 from lira.hal.profile import RobotProfile, load_profile
-from lira.hal.safety.governed import GovernedRobot
 from lira.sim_backend.catalogue import load_world
 from lira.sim_backend.foresight import Foresight, sketching
-from lira.sim_backend.twin import Twin
-from lira.tools.runs.progress import Progress
+from lira.tools.runs.simulated import simulate
+from lira.tools.runs.teach import telling
 
 BLIND_PX = 4
 
@@ -45,30 +43,25 @@ def train_expert(kind: Sensor, task: str, profile: RobotProfile, seed: int, path
     network: Network
     network = CameraNet(shape.filters, seed=seed) if kind == "camera" else LidarNet(shape.bins, seed=seed)
     novice = NetworkNovice(network, InlineTrainer(Learner(network, seed=seed, frozen_trunks=False)), LearningSettings())
-    progress = Progress()
-
-    def show(record: Record) -> None:
-        line = progress.note(record)
-        if line is not None:
-            print(line, flush=True)
-
-    twin = Twin(profile, world, seed=seed)
-    robot = GovernedRobot(twin)
-    robot.open()
-    try:
-        loop = ControlLoop(robot, truth=twin.state)
-        session = Session(robot, twin, loop, Journal(write=show), HgDagger(novice))
+    with (
+        simulate(world, profile, seed=seed) as robot,
+        closing(ScriptedTeacher(Foresight(profile, world), profile, course.teacher, seed)) as teacher,
+    ):
+        loop = ControlLoop(robot, truth=robot.arena.state)
+        session = Session(robot, robot.arena, loop, Journal(write=telling(tell)), HgDagger(novice))
         loop.arm()
-        with closing(ScriptedTeacher(Foresight(profile, world), profile, course.teacher, seed)) as teacher:
-            passed = session.teach(Same(course.drives), teacher, course.laps)
-    finally:
-        robot.close()
+        passed = session.teach(Same(course.drives), teacher, course.laps)
     if passed:
         cruise = measure_cruise(network, profile, course)
         about = Checkpoint(kind, shape.bins, shape.filters, profile.name, cruise, command, seed)
         save_checkpoint(path, network, replace(about, labels=novice.stored, training_steps=novice.training_steps))
         print(f"{kind} expert: {novice.stored} labels, {novice.training_steps} training steps, saved to {path}")
     return passed
+
+
+def tell(line: str) -> None:
+    """Print a line at once."""
+    print(line, flush=True)
 
 
 def provide(pair: str) -> None:
@@ -101,15 +94,11 @@ def blindfolded(profile: RobotProfile) -> RobotProfile:
 
 def measure_cruise(network: Network, profile: RobotProfile, course: Curriculum) -> Action:
     """Median action where the world is straight and empty: what the expert does with nothing to react to."""
-    robot = GovernedRobot(Twin(profile, load_world(course.cruise_world)))
-    robot.open()
-    try:
+    alone = Alone("novice", lambda features: network.act(features.scan, features.image))
+    with simulate(course.cruise_world, profile) as robot:
         loop = ControlLoop(robot)
         loop.arm()
-        alone = Alone("novice", lambda features: network.act(features.scan, features.image))
         steps = [loop.step(alone) for _ in range(course.cruise_steps)]
-    finally:
-        robot.close()
     actions = [step.proposal.choice.action for step in steps if step is not None]
     linear, angular = np.median(np.asarray(actions), axis=0)
     return float(linear), float(angular)

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from functools import cache
 
 from lira.fusion.control import ControlLoop
-from lira.fusion.experts.load import load_expert
+from lira.fusion.experts.load import load_policy
 from lira.fusion.experts.tasks import DEFAULT, TASKS
 from lira.fusion.learning.learner import Label
 from lira.fusion.learning.novice import Novice, is_redundant
@@ -14,9 +14,7 @@ from lira.fusion.preprocess import Features
 from lira.fusion.teaching.curriculum import curriculum
 from lira.hal.messages import Action, Episode
 from lira.hal.profile import RobotProfile
-from lira.hal.safety.governed import GovernedRobot
-from lira.sim_backend.catalogue import load_world
-from lira.sim_backend.twin import Twin
+from lira.tools.runs.simulated import simulate
 
 STEPS = 250  # of each expert
 
@@ -36,23 +34,19 @@ def warm_up(novice: Novice, names: Sequence[Sensor], profile: RobotProfile, pair
 @cache
 def own_drive(name: Sensor, profile: RobotProfile, pair: str) -> tuple[tuple[Features, Action], ...]:
     """What an expert sees and does where it was trained; a new layout begins where the last one ended."""
-    expert = load_expert(f"{name}-expert", profile, pair)
-    twin = Twin(profile, load_world(curriculum(name, pair if pair in TASKS else DEFAULT).world), renderer="tiny")
-    robot = GovernedRobot(twin)
-    robot.open()
+    expert = load_policy(f"{name}-expert", profile, pair)
+    world = curriculum(name, pair if pair in TASKS else DEFAULT).world
     seen: list[tuple[Features, Action]] = []
     layout = 0
-    try:
+    with simulate(world, profile, renderer="tiny") as robot:
         loop = ControlLoop(robot)
         loop.arm()
         while len(seen) < STEPS:
             step = loop.step(Alone(name, expert.act))
             if step is not None:
                 seen.append((step.proposal.features, step.proposal.choice.action))
-            state = twin.state()
+            state = robot.arena.state()
             if state.collided or state.lost or state.finished:
                 layout += 1
-                twin.reset(Episode(layout))
-    finally:
-        robot.close()
+                robot.arena.reset(Episode(layout))
     return tuple(seen)

@@ -3,30 +3,26 @@
 import argparse
 import contextlib
 from collections.abc import Callable, Iterator
-from pathlib import Path
 
 import msgspec
 
 from lira.fusion.control import ControlLoop
 from lira.fusion.experts.load import load_alone
 from lira.fusion.experts.tasks import task_of
-from lira.fusion.learning.learner import Label
+from lira.fusion.learning.labels import Label
 from lira.fusion.log.label_log import DemonstrationLog, read_demonstrations
 from lira.fusion.log.recorder import Journal
 from lira.fusion.log.run_log import RunWriter
-from lira.fusion.methods.presets import method_named
 from lira.fusion.operator_service import RequestDesk, RequestLine
 from lira.fusion.service import serve
-from lira.fusion.teaching.session import Apprentice
 from lira.hal.bus.bus import Bus
 from lira.hal.client.remote import RemoteArena, RemoteRobot
-from lira.hal.messages import Decision, Episode
+from lira.hal.messages import Episode
 from lira.sim_backend.world import World
 from lira.tools.launch.lifetime import CLOSE_S, saving, stop_or_interrupt
-from lira.tools.runs.folder import FLOOR, LABELS, RECORD, head, snapshot
-
-Publish = Callable[[Decision], None]
-Say = Callable[[str], None]
+from lira.tools.runs.build import NewTrainer, build_method
+from lira.tools.runs.folder import FLOOR, LABELS, RECORD, snapshot
+from lira.tools.runs.teach import Plan, Publish, Say
 
 
 def show_policy(args: argparse.Namespace, robot: RemoteRobot, publish: Publish, say: Say) -> int:
@@ -42,24 +38,21 @@ def show_policy(args: argparse.Namespace, robot: RemoteRobot, publish: Publish, 
 
 
 def learn_from_person(
-    args: argparse.Namespace, robot: RemoteRobot, make: Callable[[], Apprentice], publish: Publish, say: Say
+    args: argparse.Namespace, plan: Plan, robot: RemoteRobot, trainer: NewTrainer, publish: Publish, say: Say
 ) -> int:
     """Learn from whoever takes the wheel with the dead-man, until Ctrl-C; then, or when it fails, save the novice."""
-    profile = robot.profile
-    folder: Path = args.run or Path("runs") / args.method
+    profile, world = robot.profile, world_of(robot)
+    head, folder = plan.head(profile, world), plan.folder
+    assert folder is not None
     # The log goes first: if it is damaged, nothing else is touched.
-    mirrored = method_named(args.method).mirrored
     with (
-        DemonstrationLog(folder / LABELS, profile, mirrored=mirrored, say=say) as log,
+        DemonstrationLog(folder / LABELS, profile, mirrored=plan.preset.mirrored, say=say) as log,
         RunWriter(folder / RECORD) as record,
     ):
-        method = make()
+        method = build_method(plan.preset, profile, plan.seed, trainer, plan.pair or task_of(world), plan.more)
         novice = method.novice
-        with (
-            saving(lambda: snapshot(folder, novice, profile, args), say),
-            contextlib.closing(novice),
-        ):
-            record.write(head(args, profile, world_of(robot)))
+        with saving(lambda: snapshot(folder, novice, profile, head), say), contextlib.closing(method):
+            record.write(head)
             for old in read_demonstrations(log.path):
                 if old.stored:
                     novice.remember(Label(old.scan, old.image, old.action, old.source, novice.weight(old.source)))
@@ -72,7 +65,7 @@ def learn_from_person(
                     journal,
                     say,
                     restart=restarter(robot, args),
-                    snapshot=lambda: snapshot(folder, novice, profile, args, log.sync),
+                    snapshot=lambda: snapshot(folder, novice, profile, head, log.sync),
                 )
                 loop.arm()
                 say(f"{args.method} learns on '{args.name}' with {novice.stored} labels; hold the dead-man to drive")

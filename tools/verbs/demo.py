@@ -10,6 +10,7 @@ examples:
   lira demo --world race --laps 20 --run runs/race
   lira demo --world passage
   lira demo --method hold --proof own --layouts own      as in the thesis
+  lira demo --expert mylab.experts:wall      a third expert, of your own
   lira demo --wire        the drivers of the real robot in between, byte by byte; in real time
 
 exit status: 0 if the novice was proven within its laps and then passed every unseen layout, without a collision and
@@ -45,6 +46,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add("--world", help="world by name or .toml file (default: line-obstacles; with --wire lane, which is shorter)")
     add("--profile", help="robot by name or .toml file (default: that of the world's experiment)")
     add("--method", default="plus", help="way of teaching, as in `lira fusion` (default: %(default)s)")
+    add(
+        "--expert",
+        action="append",
+        default=[],
+        metavar="MODULE:OBJECT",
+        help="beside the pair, an expert of your own, as in `lira fusion`; may be given several times",
+    )
     add("--seed", type=natural, default=0, help="seeds teacher, training and noise (default: %(default)s)")
     add("--layout", type=natural, default=0, help="layout to learn on (default: %(default)s)")
     add("--laps", type=natural, default=12, help="give up after so many training laps (default: %(default)s)")
@@ -79,9 +87,12 @@ def run(args: argparse.Namespace) -> int:
         if find_spec(package) is None:
             raise MissingExtraError(package, extra)
     with_proof(THESIS, args.proof)
-    from lira.fusion.methods.presets import method_named  # not sooner: it takes the learner's libraries
+    from lira.fusion.experts.load import load_policy  # not sooner: it takes the learner's libraries
+    from lira.fusion.methods.presets import method_named
 
     method_named(args.method)
+    for expert in args.expert:
+        load_policy(expert, profile)
     folder: Path = args.run or Path("runs") / f"demo-{datetime.now():%Y%m%d-%H%M%S}"
     port = free_port()
     name, endpoint = f"demo_{port}", f"127.0.0.1:{port}"
@@ -90,6 +101,7 @@ def run(args: argparse.Namespace) -> int:
     fusion = [*both, "--name", name, "--connect", endpoint, "--method", args.method, "--teacher", "scripted"]
     fusion += ["--run", str(folder), "--train-laps", str(args.laps), "--unseen", str(args.unseen)]
     fusion += ["--layouts", args.layouts, "--proof", args.proof]
+    fusion += [word for expert in args.expert for word in ("--expert", expert)]
     fusion += ["--as-command", shlex.join(["lira", *sys.argv[1:]])]
     if args.wire:
         arena = f"127.0.0.1:{free_port()}"

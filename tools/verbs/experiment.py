@@ -13,6 +13,7 @@ examples:
   lira experiment race --seeds 10 --scheduler tcp://192.168.1.5:8786 --json race.json
   lira experiment all --seeds 10 --workers 2
   lira experiment results
+  lira experiment table2 --seeds 10 --method mylab.methods:Mine     # with a method of your own beside the four
 """
 
 import argparse
@@ -20,12 +21,13 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from lira.hal.errors import ConfigError
-from lira.tools.experiments.registry import REGISTRY, load
+from lira.tools.experiments.registry import REGISTRY, load, words_of
 from lira.tools.options import natural
 
 if TYPE_CHECKING:
     from lira.tools.experiments.experiment import Experiment
     from lira.tools.experiments.summary import Summary
+    from lira.tools.experiments.trial import Trial
 
 FOLDER = Path("runs") / "experiments"
 ALL, RESULTS = "all", "results"
@@ -35,13 +37,20 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
     names = "; ".join(f"{name}: {entry.words}" for name, entry in REGISTRY.items())
     add = parser.add_argument
-    add("name", choices=[*REGISTRY, ALL, RESULTS], metavar="NAME", help=f"{names}; {ALL}; {RESULTS}")
+    add("name", metavar="NAME", help=f"{names}; {ALL}; {RESULTS}; or one of your own: MODULE:OBJECT")
     add("--seeds", type=int, default=3, help="repetitions, seeds 0, 1, 2, ... (default: %(default)s)")
     add("--first-seed", type=natural, default=0, help="begin with this seed instead of 0")
     add(
         "--methods",
         metavar="NAMES",
         help=f"of unseen, table2 and race, play these, separated by commas, or {ALL} (default: four)",
+    )
+    add(
+        "--method",
+        action="append",
+        default=[],
+        metavar="MODULE:OBJECT",
+        help="of unseen, table2 and race, play this method of your own, too; may be given several times",
     )
     add(
         "--experts",
@@ -81,6 +90,7 @@ def play(args: argparse.Namespace, name: str) -> "tuple[Summary, Path]":
     """Run one experiment; return its summary and its page."""
     import msgspec
 
+    from lira.fusion.methods.presets import file_name
     from lira.tools.experiments.page import write_page
     from lira.tools.experiments.pools import Cluster, Here
     from lira.tools.experiments.runner import run_trials
@@ -91,7 +101,10 @@ def play(args: argparse.Namespace, name: str) -> "tuple[Summary, Path]":
     pool = Here(args.workers) if args.scheduler is None else Cluster(args.scheduler)
     methods = ALL if args.name == ALL and experiment.methods else args.methods
     chosen = chosen_methods(methods, experiment, name)
-    trials = [trial for trial in experiment.trials(args.seeds) if not chosen or trial.method.name in chosen]
+    listed = experiment.trials(args.seeds)
+    trials = [trial for trial in listed if not chosen or trial.method.name in chosen]
+    if args.method:
+        trials += own_trials(args.method, listed, experiment, name)
     trials = [msgspec.structs.replace(each, seed=args.first_seed + each.seed) for each in trials]
     if args.experts is not None:
         if args.name != ALL and all(trial.experts for trial in trials):
@@ -103,8 +116,27 @@ def play(args: argparse.Namespace, name: str) -> "tuple[Summary, Path]":
     command = f"lira experiment {name} --seeds {args.seeds}" + ("" if methods is None else f" --methods {methods}")
     command += f" --first-seed {args.first_seed}" if args.first_seed else ""
     command += "" if args.experts is None else f" --experts {args.experts}"
-    summary = summarise(name, REGISTRY[name].words, command, args.seeds, experiment, outcomes)
+    command += "".join(f" --method {each}" for each in args.method)
+    summary = summarise(file_name(name), words_of(name, experiment), command, args.seeds, experiment, outcomes)
     return summary, write_page(args.run, summary, experiment.figures(outcomes))
+
+
+def own_trials(names: list[str], listed: "list[Trial]", experiment: "Experiment", name: str) -> "list[Trial]":
+    """Return the trials of methods of one's own: those of one that is known, on its layouts and with its proof."""
+    import msgspec
+
+    from lira.fusion.methods.presets import method_named
+
+    if not experiment.methods:
+        raise ConfigError(f"{name} takes no --method", "It needs all of its methods together.")
+    like = [trial for trial in listed if trial.method.name == experiment.methods[0]]
+    return [
+        msgspec.structs.replace(
+            trial, method=msgspec.structs.replace(method_named(own), syllabus=trial.method.syllabus)
+        )
+        for own in names
+        for trial in like
+    ]
 
 
 def chosen_methods(words: str | None, experiment: "Experiment", name: str) -> set[str]:
@@ -146,7 +178,7 @@ def write_results(args: argparse.Namespace) -> int:
     from lira.tools.experiments import document
     from lira.tools.experiments.summary import read_summaries, write_summary
 
-    if args.methods is not None:
+    if args.methods is not None or args.method:
         raise ConfigError(f"{args.name} takes no --methods", "It is about all of them.")
     folder = args.summaries or document.SUMMARIES
     for name in REGISTRY if args.name == ALL else ():

@@ -13,22 +13,26 @@ examples:
   lira fusion --method plus --run runs/mine            learn from a person
   lira fusion --method lira --teacher scripted --run runs/taught
   lira fusion --method lira --experts corridor         in a real corridor
+  lira fusion --method lira --expert mylab.experts:wall --teacher scripted   with a third expert of your own
+  lira fusion --method mylab.methods:Mine --teacher scripted                 by a method of your own
 """
 
 import argparse
+import shlex
+import sys
 from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from lira.fusion.experts.tasks import TASKS, task_of
+from lira.fusion.experts.tasks import TASKS
 from lira.hal.errors import ConfigError
 from lira.tools.launch.lifetime import CLOSE_S
 from lira.tools.options import add_protocol, natural
 
 if TYPE_CHECKING:
-    from lira.fusion.methods.presets import Method
     from lira.hal.client.remote import RemoteRobot
     from lira.hal.messages import Decision
+    from lira.tools.runs.teach import Plan
 
 ENDPOINT = "127.0.0.1:7447"
 
@@ -44,7 +48,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="scripted teacher of a robot on a twin's devices: where that twin tells the truth (its --arena)",
     )
     what = parser.add_mutually_exclusive_group(required=True)
-    what.add_argument("--policy", help="drive only: camera-expert, lidar-expert or a .safetensors file")
+    what.add_argument(
+        "--policy",
+        help="drive only: camera-expert, lidar-expert, a .safetensors file, or your own MODULE:OBJECT",
+    )
     add(
         "--ask",
         action="store_true",
@@ -58,7 +65,15 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     what.add_argument(
         "--method",
-        help="learn by this method: plus, hold (LIRA-SPF), thesis, hg-dagger, ...; an unknown name lists them all",
+        help="learn by this method: plus, hold (LIRA-SPF), thesis, hg-dagger, ..., or your own MODULE:OBJECT; "
+        "an unknown name lists them all",
+    )
+    add(
+        "--expert",
+        action="append",
+        default=[],
+        metavar="MODULE:OBJECT",
+        help="beside the pair, an expert of your own: a function of lira.Features; may be given several times",
     )
     add("--start", choices=("human", "experts"), help="LIRA-SPF: who drives before the first training step")
     add(
@@ -96,28 +111,24 @@ def run(args: argparse.Namespace) -> int:
     """Drive until done or told to stop. Exit status 1 if the novice or the policy did not drive alone as it should."""
     import torch
 
-    from lira.hal.bus.bus import Bus
-    from lira.hal.client.remote import RemoteRobot
+    from lira.hal.client.remote import connect
 
-    if args.method is not None and method_of(args).kind == "switching" and args.teacher == "none":
+    plan = None if args.method is None else plan_of(args)
+    if plan is None and args.expert:
+        raise ConfigError("--expert goes with --method", "A policy of your own drives with --policy.")
+    if plan is not None and not plan.preset.approach.learns and args.teacher == "none":
         raise ConfigError(f"by the method '{args.method}' nobody learns", "Show it on a twin with --teacher perfect.")
     if args.ask and args.policy is None:
         raise ConfigError("--ask is for a policy that drives", "Give one with --policy, or leave --ask out.")
     torch.set_num_threads(1)  # the nets are small; and a result should not depend on the number of cores
-    bus = Bus(args.name, connect=args.connect)
-    robot = RemoteRobot(bus)
-    try:
-        robot.open()
-        if args.policy is not None:
+    with connect(args.connect, args.name, close_s=CLOSE_S) as robot:
+        if plan is None:
             return show(args, robot)
         if args.teacher == "none":
-            return learn_by_hand(args, robot)
+            return learn_by_hand(args, plan, robot)
         from lira.tools.runs.on_twin import teach
 
-        return teach(args, method_of(args), robot, publisher(robot), say)
-    finally:
-        robot.close()
-        bus.close(CLOSE_S)
+        return teach(args, plan, robot, publisher(robot), say)
 
 
 def show(args: argparse.Namespace, robot: "RemoteRobot") -> int:
@@ -131,40 +142,43 @@ def show(args: argparse.Namespace, robot: "RemoteRobot") -> int:
     return show_policy(args, robot, publisher(robot), say)
 
 
-def learn_by_hand(args: argparse.Namespace, robot: "RemoteRobot") -> int:
+def learn_by_hand(args: argparse.Namespace, plan: "Plan", robot: "RemoteRobot") -> int:
     """Learn from whoever takes the wheel."""
     from lira.fusion.learning.trainer import ProcessTrainer
-    from lira.fusion.teaching.session import Apprentice
-    from lira.tools.runs.build import apprentice
-    from lira.tools.runs.with_person import learn_from_person, world_of
+    from lira.tools.runs.with_person import learn_from_person
 
-    def make() -> Apprentice:
-        pair = args.experts or task_of(world_of(robot))
-        return apprentice(method_of(args), robot.profile, args.seed, ProcessTrainer, pair)
-
-    return learn_from_person(args, robot, make, publisher(robot), say)
+    return learn_from_person(args, plan, robot, ProcessTrainer, publisher(robot), say)
 
 
-def method_of(args: argparse.Namespace) -> "Method":
-    """Return the method by name, with what the other arguments say about it. Raises `ConfigError`."""
+def plan_of(args: argparse.Namespace) -> "Plan":
+    """Return what the arguments ask to be taught. Raises `ConfigError`, and `PluginError` for somebody's own method."""
     import msgspec
 
-    from lira.fusion.methods.lira import LiraSettings
-    from lira.fusion.methods.presets import method_named
+    from lira.fusion.methods.presets import file_name, method_named
     from lira.fusion.methods.syllabus import with_proof
+    from lira.tools.runs.teach import Plan
 
-    method = method_named(args.method)
+    preset = method_named(args.method)
     if args.start is not None:
-        if not isinstance(method.approach, LiraSettings):
-            raise ConfigError(f"'{method.name}' takes no --start", "Only LIRA-SPF does.")
-        method = msgspec.structs.replace(method, approach=msgspec.structs.replace(method.approach, start=args.start))
-    syllabus = method.syllabus
+        preset = preset.starting(args.start)
+    syllabus = preset.syllabus
     if args.layouts is not None:
         syllabus = msgspec.structs.replace(syllabus, layouts=args.layouts)
     if args.proof is not None:
         syllabus = with_proof(syllabus, args.proof)
-    learning = msgspec.structs.replace(method.learning, idle_frames=args.idle_frames)
-    return msgspec.structs.replace(method, learning=learning, syllabus=syllabus)
+    learning = msgspec.structs.replace(preset.learning, idle_frames=args.idle_frames)
+    return Plan(
+        msgspec.structs.replace(preset, learning=learning, syllabus=syllabus),
+        layout=args.layout,
+        seed=args.seed,
+        laps=args.train_laps,
+        unseen=args.unseen,
+        teacher=args.teacher,
+        pair=args.experts,
+        more=args.expert,
+        folder=args.run or Path("runs") / file_name(args.method),
+        command=args.as_command or shlex.join(["lira", *sys.argv[1:]]),
+    )
 
 
 def publisher(robot: "RemoteRobot") -> Callable[["Decision"], None]:

@@ -85,38 +85,30 @@ def run(args: argparse.Namespace) -> int:
     if args.wire is not None:
         return run_wire(args, profile, world)
 
-    import msgspec
-
-    from lira.hal.bus.access_log import count_refusals
-    from lira.hal.bus.bus import Bus
-    from lira.hal.safety.governed import GovernedRobot
-    from lira.hal.server.server import HalServer, stop_on_signal
+    from lira.hal.server.serve import serve
     from lira.sim_backend.twin import Twin
 
     factor = None if args.lockstep else args.speed
     twin = Twin(profile, world, layout=args.layout, seed=args.seed, realtime_factor=factor, renderer=args.renderer)
     pace = "lockstep" if args.lockstep else "real time" if factor == 1.0 else f"{factor:g} times real time"
-    bus = Bus(args.name, listen=args.listen, insecure=args.insecure, refusals=count_refusals())
-    try:
-        with stop_on_signal() as stop:
 
-            def ready() -> None:
-                where = f"world '{world.name}' ({profile.name}) on {args.listen}"
-                where += ", encrypted" if bus.encrypted else ", open to anybody there" if args.insecure else ""
-                print(f"twin '{args.name}' serves {where}, {pace}; stop with Ctrl-C", flush=True)
-                if not args.lockstep:  # there the driver tells how it goes
-                    threading.Thread(target=report, args=(twin, bus, stop), daemon=True, name="status").start()
+    def ready(bus: "Bus", stop: threading.Event) -> None:
+        where = f"world '{world.name}' ({profile.name}) on {args.listen}"
+        where += ", encrypted" if bus.encrypted else ", open to anybody there" if args.insecure else ""
+        print(f"twin '{args.name}' serves {where}, {pace}; stop with Ctrl-C", flush=True)
+        if not args.lockstep:  # there the driver tells how it goes
+            threading.Thread(target=report, args=(twin, bus, stop), daemon=True, name="status").start()
 
-            HalServer(
-                GovernedRobot(twin),
-                bus,
-                twin,
-                arena_info=msgspec.json.encode(world),
-                lockstep=args.lockstep,
-                ready=ready,
-            ).run(stop)
-    finally:
-        bus.close()
+    serve(
+        twin,
+        args.name,
+        args.listen,
+        arena=twin,
+        arena_info=twin.info,
+        lockstep=args.lockstep,
+        insecure=args.insecure,
+        ready=ready,
+    )
     return 0
 
 
@@ -143,7 +135,7 @@ def run_wire(args: argparse.Namespace, profile: "RobotProfile", world: "World") 
             if bus is None:
                 stop.wait()
             else:
-                serve_arena(wired, bus, profile, world, stop)
+                serve_arena(wired, bus, profile, stop)
         finally:
             wired.close()
     return 0
@@ -160,14 +152,14 @@ def _check_echoes(share: float, profile: "RobotProfile", world: "World") -> None
         )
 
 
-def serve_arena(wired: "WiredTwin", bus: "Bus", profile: "RobotProfile", world: "World", stop: threading.Event) -> None:
+def serve_arena(wired: "WiredTwin", bus: "Bus", profile: "RobotProfile", stop: threading.Event) -> None:
     """Tell the truth, and put the robot back when asked, until told to stop."""
     import msgspec
 
     from lira.hal.bus.services import REALTIME, Info
     from lira.hal.server.arena import ArenaLoop
 
-    info = Info(profile, REALTIME, bus.epoch, msgspec.Raw(msgspec.json.encode(world)))
+    info = Info(profile, REALTIME, bus.epoch, msgspec.Raw(wired.twin.info))
     ArenaLoop(wired, bus, info, wired.twin.now).run(stop)
 
 

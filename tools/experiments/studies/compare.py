@@ -18,7 +18,7 @@ from lira.tools.experiments.measures import (
 from lira.tools.experiments.methods import ALL, HG_DAGGER, LIRA, USUAL
 from lira.tools.experiments.pairs import TOTAL, bounds, words
 from lira.tools.experiments.pictures import box_pictures, spelt
-from lira.tools.experiments.trial import Method, Trial
+from lira.tools.experiments.trial import Preset, Trial
 
 QUANTITIES = ("human_labels", "interventions")
 # Table II as printed, in the columns of our summary.
@@ -48,7 +48,7 @@ DEMONSTRATED = "Where the experts' own labels begin it (plus, and after a warm s
 THESIS_RATIOS = {"human_labels": 156.5 / 59, "interventions": 19.5 / 9.5}
 
 
-def trials(seeds: int, world: str, methods: Sequence[Method] = ALL) -> list[Trial]:
+def trials(seeds: int, world: str, methods: Sequence[Preset] = ALL) -> list[Trial]:
     """Each of the methods on every seed."""
     return [Trial(method, world, seed) for method in methods for seed in range(seeds)]
 

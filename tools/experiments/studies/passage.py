@@ -5,21 +5,18 @@ from functools import cache, partial
 
 import numpy as np
 
-from lira.fusion.control import ControlLoop
 from lira.fusion.experts.files import SHIPPED, Sensor
-from lira.fusion.experts.load import load_expert
+from lira.fusion.experts.load import load_policy
 from lira.fusion.log.recorder import Journal
 from lira.fusion.log.run_log import LapRecord
 from lira.fusion.methods.base import Alone
 from lira.fusion.methods.presets import METHODS
-from lira.fusion.teaching.session import Same, Session
-from lira.hal.safety.governed import GovernedRobot
-from lira.sim_backend.twin import Twin
 from lira.tools.experiments.experiment import Experiment, Finding, Outcomes, Picture, Row, Table
 from lira.tools.experiments.measures import by_method, median, method_rows
 from lira.tools.experiments.notes import Notes, Track
 from lira.tools.experiments.trial import Outcome, Trial
-from lira.tools.runs.build import lap
+from lira.tools.runs.course import Course, run_course
+from lira.tools.runs.simulated import simulate
 
 WORLD = "passage"
 PRESETS = ("thesis", "hold")
@@ -35,19 +32,11 @@ def trials(seeds: int) -> list[Trial]:
 @cache
 def alone(name: Sensor, trial: Trial) -> tuple[LapRecord, Track]:
     """Drive the passage with one expert and nobody to help, as far as it comes."""
-    expert = load_expert(f"{name}-expert", trial.profile, trial.pair)
-    notes = Notes()
-    twin = Twin(trial.profile, trial.world, renderer="tiny")
-    robot = GovernedRobot(twin)
-    robot.open()
-    try:
-        loop = ControlLoop(robot, truth=twin.state)
-        journal = Journal(write=notes.record)
-        session = Session(robot, twin, loop, journal, None, lambda _: Alone(name, expert.act))
-        loop.arm()
-        session.prove(Same([lap(trial.profile, twin.world, 0)]))
-    finally:
-        robot.close()
+    expert = load_policy(f"{name}-expert", trial.profile, trial.pair)
+    notes, method = Notes(), Alone(name, expert.act)
+    with simulate(trial.world, trial.profile, renderer="tiny") as robot:
+        course = Course(trial.profile, robot.arena.world)
+        run_course(robot, robot.arena, method, None, Journal(write=notes.record), course)
     return notes.laps[0], notes.tracks[0]
 
 

@@ -9,7 +9,7 @@ import numpy as np
 from lira.fusion.learning.novice import LearningSettings
 from lira.fusion.methods.lira import LiraSettings
 from lira.tools.experiments.experiment import Experiment, Finding, Outcomes, Picture, Row, Table
-from lira.tools.experiments.trial import Method, Trial
+from lira.tools.experiments.trial import Preset, Trial
 
 Printed = dict[tuple[int, int], tuple[int, int, int | None]]
 # (theta, L) in per cent -> the thesis's buffer and training steps after lap 1 and 2; C.2 gives no steps.
@@ -34,10 +34,10 @@ def trials(seeds: int, table: str) -> list[Trial]:
     ]
 
 
-def method(preset: str, theta: int, redundancy: int) -> Method:
+def method(preset: str, theta: int, redundancy: int) -> Preset:
     """LIRA-SPF with thresholds in per cent."""
     name = f"lira-{preset}-theta{theta}-L{redundancy}"
-    return Method(
+    return Preset(
         name, LiraSettings(theta=theta / 100, hold=HOLD[preset]), LearningSettings(redundancy=redundancy / 100)
     )
 

@@ -10,11 +10,11 @@ from collections.abc import Sequence
 
 from msgspec.structs import replace
 
-from lira.fusion.methods.presets import METHODS, Method
+from lira.fusion.methods.presets import METHODS, Preset
 from lira.fusion.methods.syllabus import with_proof
 from lira.tools.experiments import pairs
 from lira.tools.experiments.experiment import Experiment, Outcomes, Picture, Row, Table
-from lira.tools.experiments.measures import driving_row, effort_row, label_row, median, method_rows
+from lira.tools.experiments.measures import by_method, driving_row, effort_row, label_row, median, method_rows
 from lira.tools.experiments.pairs import TOTAL
 from lira.tools.experiments.pictures import box_pictures
 from lira.tools.experiments.trial import Outcome, Trial
@@ -28,7 +28,7 @@ NAMES = (*USUAL, "hold-kernel", "hg-dagger-fresh", "hg-dagger-warm-m10-mirrored"
 QUANTITIES = ("human_labels", "interventions", TOTAL)
 
 
-def to_quality(name: str) -> Method:
+def to_quality(name: str) -> Preset:
     """A method that is taught until its novice is as good as all others."""
     method = METHODS[name]
     return replace(method, syllabus=with_proof(method.syllabus, PROOF))
@@ -40,10 +40,10 @@ def trials(seeds: int) -> list[Trial]:
 
 
 def by_name(outcomes: Outcomes) -> dict[str, list[Outcome]]:
-    """Outcomes of each method in one order of pairs and seeds."""
+    """Outcomes of each method in one order of pairs and seeds, somebody's own after those of the project."""
     ordered = sorted(outcomes, key=lambda each: (each.trial.pair, each.trial.seed))
-    groups = {name: [each for each in ordered if each.trial.method.name == name] for name in NAMES}
-    return {name: group for name, group in groups.items() if group}
+    groups = by_method(ordered)
+    return {name: groups[name] for name in (*NAMES, *(name for name in groups if name not in NAMES)) if name in groups}
 
 
 def quality_row(group: Sequence[Outcome]) -> Row:
@@ -81,8 +81,9 @@ def quality(outcomes: Outcomes) -> list[Row]:
 
 def ratios(outcomes: Outcomes) -> list[Row]:
     """Every method's effort over that of plus, pair by pair of one seed and one pair of experts."""
-    compared = [(BASE, name) for name in NAMES if name != BASE]
-    return [{**row, "quality": QUALITY} for row in pairs.ratios(by_name(outcomes), compared, QUANTITIES)]
+    groups = by_name(outcomes)
+    compared = [(BASE, name) for name in groups if name != BASE]
+    return [{**row, "quality": QUALITY} for row in pairs.ratios(groups, compared, QUANTITIES)]
 
 
 def tables(outcomes: Outcomes) -> list[Table]:

@@ -1,0 +1,73 @@
+"""What a method teaches, seen from outside: a policy that takes labels and, now and then, becomes a better one."""
+
+from typing import TYPE_CHECKING
+
+from lira.fusion.learning.labels import Label
+from lira.fusion.preprocess import Features
+from lira.hal.messages import Action
+
+if TYPE_CHECKING:
+    from lira.fusion.policies.networks import Network
+
+
+class LearnedPolicy:
+    """A policy under training. The project's is `Novice`; one of your own defines `act` and `remember`.
+
+    `stored` counts its labels and `training_steps` how often it has learned from them: before the first time it is not
+    asked to prove itself.
+    """
+
+    stored: int = 0
+    training_steps: int = 0
+
+    @property
+    def trained(self) -> bool:
+        """Whether it has learned anything."""
+        return self.training_steps > 0
+
+    def act(self, features: Features) -> Action:  # noqa: ARG002 - for those who look
+        """What it does now, in [-1, 1]^2."""
+        return 0.0, 0.0
+
+    def alone(self, features: Features) -> Action:
+        """What it does when nobody teaches it any more: the same, unless it knows how it errs."""
+        return self.act(features)
+
+    def proving(self, features: Features) -> Action:
+        """The same in a run that proves it, from which it may learn what it knows."""
+        return self.alone(features)
+
+    def remember(self, label: Label) -> None:  # noqa: ARG002
+        """Take in a label."""
+        self.stored += 1
+
+    def learn(self, features: Features, action: Action, source: str, a_n: Action) -> bool:  # noqa: ARG002
+        """Take in a label unless it tells nothing new; `a_n` is its own action there. Returns whether it was kept."""
+        self.remember(Label(features.scan, features.image, action, source, self.weight(source)))
+        return True
+
+    def leaves_out(self, human: Action) -> bool:  # noqa: ARG002
+        """Whether the human's action is to be no label."""
+        return False
+
+    def weight(self, source: str) -> float:  # noqa: ARG002
+        """How much a label of this source counts."""
+        return 1.0
+
+    def set_aside(self) -> list[tuple[int, str]]:
+        """Number and source of the labels it does not believe; none, unless it can tell."""
+        return []
+
+    def frozen(self) -> "Network | None":
+        """Return a copy of the policy as it drives alone, to be saved; None if it is no network."""
+        return None
+
+    def update(self, now_s: float) -> None:
+        """Train if it is time to, and adopt what training has brought; called before every decision."""
+
+    def close(self) -> None:
+        """End the training, in bounded time."""
+
+
+UNTAUGHT = LearnedPolicy()
+"""Nobody: the policy of a method that teaches none."""

@@ -1,0 +1,81 @@
+"""`lira new`: what it writes has tests that pass, and a name that is found."""
+
+import subprocess
+import sys
+import tomllib
+
+import pytest
+
+from lira.hal import plugins
+from lira.hal.plugins import Door
+from lira.tools.cli import main
+from lira.tools.verbs.new import KINDS
+
+
+@pytest.fixture
+def project(tmp_path, capsys):
+    """Write a project; return its folder and what is said."""
+
+    def write(kind, name):
+        assert main(["new", kind, name, "--into", str(tmp_path)]) == 0
+        return tmp_path / name, capsys.readouterr().out
+
+    return write
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_its_tests_pass_as_they_are_written(project, kind):
+    folder, said = project(kind, f"my-{kind}")
+    assert "python -m pytest" in said
+    assert "$" not in "".join(path.read_text() for path in folder.rglob("*.*"))
+    done = subprocess.run(
+        [sys.executable, "-m", "pytest", "-q", "-W", "error"],
+        cwd=folder,
+        capture_output=True,
+        text=True,
+        check=False,
+        timeout=600,
+    )
+    assert done.returncode == 0, done.stdout + done.stderr
+    assert "passed" in done.stdout
+
+
+@pytest.mark.parametrize("kind", [kind for kind, about in KINDS.items() if about.door])
+def test_the_entry_point_names_what_is_there(project, monkeypatch, kind):
+    folder, _ = project(kind, f"a-{kind}")
+    monkeypatch.chdir(folder)
+    monkeypatch.setattr(sys, "path", [*sys.path])
+    monkeypatch.setattr(plugins, "_owners", {})
+    (points,) = tomllib.loads((folder / "pyproject.toml").read_text())["project"]["entry-points"].items()
+    door, entries = points
+    assert door == f"lira.{KINDS[kind].door}"
+    assert callable(Door(kind, door).find(entries[f"a-{kind}"], {}))
+
+
+def test_it_is_formatted_as_a_linter_wants_it(project):
+    lint = [sys.executable, "-m", "ruff", "check", "--isolated", "--line-length", "120", "--select", "E,F,I,UP,B"]
+    for kind in KINDS:
+        folder, _ = project(kind, f"neat-{kind}")
+        done = subprocess.run(lint, cwd=folder, capture_output=True, text=True, check=False)
+        assert done.returncode == 0, done.stdout
+
+
+@pytest.mark.parametrize("name", ["class", "json", "lira", "My Wall", "3walls", "Wall", ""])
+def test_a_name_that_can_be_no_module_is_refused(tmp_path, capsys, name):
+    assert main(["new", "expert", name, "--into", str(tmp_path / "there")]) == 2
+    assert "cannot be the name of a module" in capsys.readouterr().err
+    assert not (tmp_path / "there").exists()
+
+
+def test_what_is_there_is_left_alone(project, tmp_path, capsys):
+    folder, _ = project("world", "mine")
+    (folder / "mine.toml").write_text("mine")
+    assert main(["new", "world", "mine", "--into", str(tmp_path)]) == 2
+    assert "is there already" in capsys.readouterr().err
+    assert (folder / "mine.toml").read_text() == "mine"
+
+
+def test_a_folder_that_cannot_be_written_is_one_clear_error(tmp_path, capsys):
+    (tmp_path / "file").write_text("")
+    assert main(["new", "expert", "wall", "--into", str(tmp_path / "file")]) == 2
+    assert "cannot write" in capsys.readouterr().err

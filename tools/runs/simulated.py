@@ -1,0 +1,48 @@
+"""A twin in this process: what an experiment, a script or a notebook drives, as fast as the machine can."""
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+from lira.fusion.experts.tasks import TASKS, task_of
+from lira.hal.profile import RobotProfile, load_profile
+from lira.hal.safety.governed import GovernedRobot
+from lira.sim_backend.catalogue import load_world
+from lira.sim_backend.sensors import Renderer
+from lira.sim_backend.twin import Twin
+from lira.sim_backend.world import World
+
+
+class SimulatedRobot(GovernedRobot):
+    """A twin behind its governor. `arena` is what a floor has not: a fresh start, and where the robot really is."""
+
+    def __init__(self, twin: Twin) -> None:
+        super().__init__(twin)
+        self.arena = twin
+
+
+@contextmanager
+def simulate(
+    world: str | World = "line-obstacles",
+    profile: str | RobotProfile | None = None,
+    *,
+    layout: int = 0,
+    seed: int = 0,
+    renderer: Renderer = "auto",
+    realtime_factor: float | None = None,
+) -> Iterator[SimulatedRobot]:
+    """Open a robot in a simulated world, and close it in the end.
+
+    `world` and `profile` are names, paths of TOML files, or what was loaded; without a profile it is the robot of the
+    thesis's experiment in that world. Time passes only while somebody drives, or by itself with `realtime_factor`.
+    Raises `ConfigError` for a name that is none, `MissingExtraError` without pybullet.
+    """
+    place = load_world(world) if isinstance(world, str) else world
+    kind = TASKS[task_of(place.name)].profile if profile is None else profile
+    body = load_profile(kind) if isinstance(kind, str) else kind
+    twin = Twin(body, place, layout=layout, seed=seed, renderer=renderer, realtime_factor=realtime_factor)
+    robot = SimulatedRobot(twin)
+    try:
+        robot.open()
+        yield robot
+    finally:
+        robot.close()

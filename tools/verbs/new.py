@@ -1,0 +1,99 @@
+"""Begin a project of your own: an expert, a method, a robot, a sensor or a world, with tests that pass.
+
+It writes a folder with the thing itself, a test, a README and, so that other folders know it by its name once it is
+installed, a pyproject.toml with the entry point. Change it step by step, and keep the tests passing.
+
+examples:
+  lira new expert wall                 an expert in the folder wall/
+  lira new method far-from-all
+  lira new robot rover --into ~/robots
+  lira new world my-lab
+"""
+
+import argparse
+import keyword
+import sys
+from importlib import resources
+from importlib.resources.abc import Traversable
+from pathlib import Path
+from string import Template
+from typing import NamedTuple
+
+from lira.hal.errors import ConfigError, StorageError
+
+
+class Kind(NamedTuple):
+    """What can be begun: its group of entry points, and what in the module the entry point names."""
+
+    door: str
+    thing: str
+
+
+KINDS = {
+    "expert": Kind("experts", "$package"),
+    "method": Kind("methods", "Settings"),
+    "robot": Kind("robots", "$title"),
+    "sensor": Kind("robots", "robot"),
+    "world": Kind("", ""),
+}
+PROFILE = "thesis-sim"  # what a robot's own profile begins as
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the arguments."""
+    parser.add_argument("kind", choices=KINDS, help="what it is to be")
+    parser.add_argument("name", help="what it is to be called")
+    parser.add_argument("--into", type=Path, default=Path(), metavar="DIR", help="where its folder goes")
+
+
+def run(args: argparse.Namespace) -> int:
+    """Write the project, and say what to do next."""
+    folder = args.into / args.name
+    written = write_project(args.kind, args.name, folder)
+    print("\n".join(str(path) for path in written))
+    print(f"\nnext: cd {folder} && python -m pytest; README.md says how to use it")
+    return 0
+
+
+def write_project(kind: str, name: str, folder: Path) -> list[Path]:
+    """Write a project of this kind. Raises `ConfigError` for a bad name, `StorageError` if it cannot be written."""
+    words = {"kind": kind, "name": name, "package": package_of(name), "door": KINDS[kind].door}
+    words["title"] = "".join(part.capitalize() for part in words["package"].split("_"))
+    words["thing"] = Template(KINDS[kind].thing).substitute(words)
+    if folder.exists():
+        raise ConfigError(f"{folder} is there already", "Choose another name, or another folder with --into.")
+    texts = {place(source, words["package"]): source.read_text(encoding="utf-8") for source in templates(kind)}
+    project = {path: Template(text).substitute(words) for path, text in texts.items()}
+    if kind == "robot":
+        profile = resources.files("lira.hal") / "profiles" / f"{PROFILE}.toml"
+        project[Path(f"{words['package']}.toml")] = profile.read_text(encoding="utf-8").replace(PROFILE, name)
+    try:
+        for path, text in project.items():
+            (folder / path).parent.mkdir(parents=True, exist_ok=True)
+            (folder / path).write_text(text, encoding="utf-8")
+    except OSError as error:
+        raise StorageError(f"cannot write {folder}: {error.strerror}", "Choose another folder with --into.") from error
+    return sorted(folder / path for path in project)
+
+
+def package_of(name: str) -> str:
+    """Return the module's name. Raises `ConfigError` for a name that cannot be one, or that hides another module."""
+    package = name.replace("-", "_")
+    taken = keyword.iskeyword(package) or package in sys.stdlib_module_names or package in ("lira", "numpy", "pytest")
+    if taken or not package.isidentifier() or package != package.lower():
+        what = f"'{name}' cannot be the name of a module"
+        raise ConfigError(what, "Use small letters, digits and hyphens, and no name that Python has already: my-wall.")
+    return package
+
+
+def templates(kind: str) -> list[Traversable]:
+    """Return the template files of a kind; what all kinds share gives way to what a kind has of its own."""
+    root = resources.files("lira.tools") / "templates"
+    found = {file.name: file for part in ("common", kind) for file in (root / part).iterdir()}
+    return list(found.values())
+
+
+def place(source: Traversable, package: str) -> Path:
+    """Return where in the project a template goes."""
+    name = source.name.removesuffix(".tmpl").replace("module", package)
+    return Path("tests") / name if name.startswith("test_") else Path(name)
