@@ -19,9 +19,7 @@ DOCS = ROOT / "docs"
 PACKAGES = ("hal", "robot", "sim_backend", "fusion", "tools")
 FOLDERS = (*PACKAGES, "tests", "docs", "examples", ".ci", ".github")
 PAGES = sorted([*DOCS.rglob("*.md"), *(ROOT / f"{name}.md" for name in ("README", "CONTRIBUTING", "SECURITY"))])
-# Pages on what one brings along are tried as soon as it can be brought: once there is a public API.
-PUBLIC = frozenset(getattr(lira, "__all__", ()))
-TRIED = [page for page in PAGES if PUBLIC or page.stem not in ("expert", "method", "robot", "sensor", "read-a-run")]
+PUBLIC = frozenset(lira.__all__)
 
 # Names with a word that the glossary bans, as of today: rename them, and take them out here.
 BANNED_STILL = {
@@ -108,7 +106,7 @@ def test_the_site_has_every_page_once_and_no_other():
     assert sorted(pages(project["nav"])) == sorted(str(page.relative_to(DOCS)) for page in DOCS.rglob("*.md"))
 
 
-@pytest.mark.parametrize("page", TRIED, ids=shown)
+@pytest.mark.parametrize("page", PAGES, ids=shown)
 def test_commands_are_understood(page, capsys):
     """Each is parsed, not run."""
     targets = re.findall(r"^([a-z-]+):", read(ROOT / "Makefile"), flags=re.MULTILINE)
@@ -127,7 +125,7 @@ def test_commands_are_understood(page, capsys):
             pytest.fail(f"lira {shlex.join([name, *words])}: {capsys.readouterr().err}")
 
 
-@pytest.mark.parametrize("page", TRIED, ids=shown)
+@pytest.mark.parametrize("page", PAGES, ids=shown)
 def test_code_is_python_and_uses_names_of_the_public_api(page):
     for block in blocks(page, "python"):
         tree = ast.parse(block)
