@@ -17,6 +17,7 @@ from lira.hal.errors import ConfigError, StorageError
 
 T = TypeVar("T")
 MOST_BYTES = 2**20  # a hundred times the longest that comes with the project
+MOST_DOTS = 5000  # in a line of TOML, whose parser takes minutes for a key of so many parts
 COMPARE = "Compare the file with the ones that come with the project."
 # What decoding raises for text that is not what it should be. Deep nesting ends at Python's limit of recursion.
 MALFORMED = (msgspec.MsgspecError, ValueError, OverflowError, RecursionError)
@@ -63,6 +64,8 @@ def load_toml(path: Path, kind: type[T]) -> T:
 
 def parse_toml(text: str, kind: type[T], where: str) -> T:
     """Turn TOML text into `kind`; `where` names its origin in errors. Raises `ConfigError`."""
+    if any(line.count(".") > MOST_DOTS for line in text.splitlines()):
+        raise ConfigError(f"{where} has a line with more than {MOST_DOTS} dots", COMPARE)
     try:
         return msgspec.convert(tomllib.loads(text), kind)
     except tomllib.TOMLDecodeError as error:
