@@ -1,6 +1,7 @@
 """The HAL server: puts one robot on the bus, in real time or in lockstep, and stops it before anything else."""
 
 import signal
+import sys
 import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -18,7 +19,7 @@ from lira.hal.server.estop_service import EstopDesk
 from lira.hal.server.info_service import LOCKSTEP, REALTIME, Desk, Info
 from lira.hal.server.instance import only_instance
 from lira.hal.server.lockstep import LockstepLoop
-from lira.hal.server.realtime import JOIN_S, AppliedLoop, CommandLoop, ImageLoop, SensorLoop
+from lira.hal.server.realtime import JOIN_S, SWITCH_S, AppliedLoop, CommandLoop, ImageLoop, SensorLoop
 from lira.hal.server.sensor_publisher import Outlet
 
 LOOK_S = 0.05
@@ -80,6 +81,7 @@ class HalServer:
             self._robot.close()
 
     def _run_realtime(self, stop: threading.Event) -> None:
+        sys.setswitchinterval(SWITCH_S)
         crew = _Crew(stop)
         opened, wheels_still = threading.Event(), threading.Event()
         outlet = Outlet(self._bus, self._robot.profile.camera, lockstep=False)
