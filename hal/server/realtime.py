@@ -23,6 +23,9 @@ POLL_S = 0.002  # how long a command may lie
 WATCHDOG_S = 0.02
 SENSOR_S = 0.005  # how long a new reading may lie
 JOIN_S = 2.0
+# How long one thread may hold the interpreter while others wait for it. By default it is ten times as long, and the
+# thread that moves the wheels needs it several times a poll: who answers a flood of questions would hold it up.
+SWITCH_S = 0.0005
 UNTOLD = 16  # what was applied and could not be told yet, at most
 
 

@@ -1,6 +1,7 @@
 """The HAL server: puts one robot on the bus, in real time or in lockstep, and stops it before anything else."""
 
 import signal
+import sys
 import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -19,7 +20,7 @@ from lira.hal.server.estop_service import EstopDesk
 from lira.hal.server.info_service import Desk
 from lira.hal.server.instance import only_instance
 from lira.hal.server.lockstep import LockstepLoop
-from lira.hal.server.realtime import JOIN_S, AppliedLoop, CommandLoop, PictureLoop, SensorLoop
+from lira.hal.server.realtime import JOIN_S, SWITCH_S, AppliedLoop, CommandLoop, PictureLoop, SensorLoop
 from lira.hal.server.sensor_publisher import SensorPublisher
 
 LOOK_S = 0.05
@@ -81,6 +82,7 @@ class HalServer:
             self._robot.close()
 
     def _run_realtime(self, stop: threading.Event) -> None:
+        sys.setswitchinterval(SWITCH_S)
         crew = _Crew(stop)
         opened, wheels_still = threading.Event(), threading.Event()
         publisher = SensorPublisher(self._bus, self._robot.profile, lockstep=False)

@@ -18,6 +18,7 @@ from lira.hal.messages.codec import encode
 from lira.hal.messages.compression import read_depth
 from lira.hal.profile import STOP_BUDGET_S, Depth
 from lira.hal.safety.governed import GovernedRobot
+from lira.hal.server.realtime import SWITCH_S
 from lira.hal.server.server import HalServer
 from lira.hal.testing import NullRobot
 
@@ -45,6 +46,14 @@ def test_a_decision_is_kept_alive_and_a_hung_loop_is_not():
         wait_for(lambda: is_still(robot))
         assert robot.inner.now() - decided_s < DECISION_S + STOP_BUDGET_S + 0.2
         wait_for(lambda: client.drive(Command(GO, client.now())).reason is Reason.NEUTRAL_FIRST)
+
+
+def test_no_thread_of_a_robots_process_holds_the_interpreter_for_long_while_the_wheels_need_it(monkeypatch):
+    asked = []
+    monkeypatch.setattr("sys.setswitchinterval", asked.append)
+    with served(real_time_null()):
+        assert asked == [SWITCH_S]
+    assert SWITCH_S <= 0.001
 
 
 def test_who_has_not_heard_that_the_robot_stopped_does_not_arm_it_with_a_zero():

@@ -164,9 +164,9 @@ ROWS = (
     Row("link delayed by 500 ms", link(delay_s=0.5), mend_link, hold_s=1.5),
     Row("link delayed more and more", one_by_one(INSIST, acts.creep), mend_link),
     Row("link throttled to 1 kB/s", link(narrow_byte_s=1e3), mend_link, hold_s=1.5),
-    Row("every third datagram lost", link(lost=1 / 3), mend_link, silence=True),
-    Row("datagrams twice", link(copies=2), mend_link, silence=True),
-    Row("datagrams swapped", link(swap=True), mend_link, silence=True),
+    Row("every third datagram lost", one_by_one(INSIST, link(lost=1 / 3)), mend_link, silence=True),
+    Row("datagrams twice", one_by_one(INSIST, link(copies=2)), mend_link, silence=True),
+    Row("datagrams swapped", one_by_one(INSIST, link(swap=True)), mend_link, silence=True),
     # Commands that are none.
     Row("commands of nan", driver_does("nan"), stopped_by=(REFUSAL,), refusal=("not finite",), quick=True),
     Row("commands of inf", driver_does("inf"), stopped_by=(REFUSAL,), refusal=("not finite",), trials=1),

@@ -1,4 +1,4 @@
-"""A peer that sends as much as fits through, until it is killed. It knows nothing but zenoh, which is fastest.
+"""A peer that sends as much as fits through, until it is killed. It speaks plain zenoh, which is fastest.
 
 python -m lira.tools.stop_test.parts.flood HOST:PORT ROBOT KIND
 """
@@ -10,10 +10,12 @@ import time
 
 import zenoh
 
+from lira.hal.bus.topics import ESTOP_LOOK, INFO
+
 BACK = b"\x00\x01\x00\x00" + struct.pack("<6d", -0.1, 0.0, 0.0, 0.0, 0.0, 0.0)  # geometry_msgs/Twist in CDR
 SIZES = {"commands": len(BACK), "samples of 1 MB": 1_000_000}
 QUERIES = "queries"
-ASKED = ("info", "estop/ask")
+ASKED = (INFO, ESTOP_LOOK)
 AT_ONCE, PAUSE_S = 64, 0.001  # queries under way: more than the robot can hold
 
 
