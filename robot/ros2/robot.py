@@ -1,5 +1,6 @@
 """A robot behind zenoh-bridge-ros2dds as a `hal.port.Robot`: its topics are read and written as ROS 2 has them."""
 
+import math
 import threading
 import time
 from collections.abc import Mapping
@@ -24,6 +25,7 @@ BLIND_S = 0.5  # driven on nothing older than this
 OPEN_S = 10.0
 LOOK_S = 0.002
 SEND_S = 0.05
+STOOD_S = 0.1  # nobody here waits so long before it looks at the time again
 FAREWELL = 3
 BRIDGE = "Does zenoh-bridge-ros2dds run there and let this topic through? Name it with --topic NAME=ROS_TOPIC."
 
@@ -75,6 +77,7 @@ class Ros2Robot:
         self._clock = ClockEstimate()
         self._silences = 0  # how often a topic that is needed was silent, and came back
         self._sent, self._sent_s = STOP, 0.0
+        self._told = 0.0, math.inf  # what the time was last, and when by our own clock
 
     @property
     def profile(self) -> RobotProfile:
@@ -151,7 +154,15 @@ class Ros2Robot:
         return {name: f"'{self._interface.topic(name).key}' is silent. {BRIDGE}" for name in self._silent()}
 
     def _now(self) -> float:
-        return self._clock.now(time.monotonic()) if self._clock.known else 0.0
+        """The robot's time. If this process stood still it counts that itself: what comes first is of before, and by
+        that no time would have passed.
+        """
+        if not self._clock.known:
+            return 0.0
+        local_s, (told_s, told_at_s) = time.monotonic(), self._told
+        gap_s = local_s - told_at_s
+        self._told = max(self._clock.now(local_s), told_s + gap_s if gap_s > STOOD_S else told_s), local_s
+        return self._told[0]
 
     def _send(self, twist: Twist, now_s: float) -> None:
         self._sent, self._sent_s = twist, time.monotonic()

@@ -149,6 +149,16 @@ def test_what_was_decided_too_long_ago_by_the_time_it_is_sent_is_zero():
         assert (came[0].twist, came[0].reason) == (STOP, Reason.STALE)
 
 
+def test_a_process_that_stood_still_knows_how_long_though_all_that_comes_is_of_before():
+    with closing(Peer(port := free_port())), closing(Bus("far", connect=f"127.0.0.1:{port}", prefix="")) as bus:
+        robot = Ros2Robot(PROFILE, bus, Interface())
+        robot.open()
+        before_s = robot.now()
+        robot._clock.now = lambda _: before_s
+        time.sleep(0.3)
+        assert robot.now() - before_s > 0.29
+
+
 def test_other_names_are_used_and_mistaken_ones_refused(capsys):
     with served(Interface(topics={"odom": "/scan"})) as (_, client):
         wait_for(lambda: client.read().scan is not None)
