@@ -20,11 +20,12 @@ def cull(
     say_mutant: Callable[[Result], None],
 ) -> list[Result]:
     """Try the rows of every mutant, first without any: a row that fails by itself catches nothing."""
-    sound = _passed(Matrix(folder / "sound", profile, seed), rows_of(mutants), say_row)
+    sound = _passed(Matrix(folder / "sound", profile, seed), rows_of(mutants), 1, say_row)
     results = []
     for number, mutant in enumerate(mutants):
         matrix = Matrix(folder / str(number), profile, seed, mutant)
-        results.append(judge_mutant(mutant, sound, _passed(matrix, rows_of([mutant]), say_row)))
+        broken = _passed(matrix, rows_of([mutant]), mutant.trials, say_row)
+        results.append(judge_mutant(mutant, sound, broken))
         say_mutant(results[-1])
     return results
 
@@ -51,7 +52,7 @@ def judge_mutant(mutant: Mutant, sound: dict[str, str], broken: dict[str, str]) 
     }
 
 
-def _passed(matrix: Matrix, rows: Sequence[Row], say: Callable[[Result], None]) -> dict[str, str]:
-    """Try rows once each, and say how each went."""
-    results = matrix.run(rows, 1, say)
+def _passed(matrix: Matrix, rows: Sequence[Row], trials: int, say: Callable[[Result], None]) -> dict[str, str]:
+    """Try rows, and say how each went."""
+    results = matrix.run(rows, trials, say)
     return {str(one["fault"]): "" if one["passed"] else str(one.get("error", FAILED)) for one in results}
