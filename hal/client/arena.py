@@ -45,7 +45,7 @@ class WiredArena:
         deadline_s = time.monotonic() + MOMENT_S
         while (age_s := self._listen()) is None:
             if time.monotonic() > deadline_s:
-                raise BusError("the twin does not say where the robot really is", "Look whether it still runs.")
+                raise BusError("the twin does not say where the robot really is", "Check that it is still running.")
             time.sleep(POLL_S)
         assert self._newest is not None
         return replace(self._newest, stamp_s=self._robot.now() - age_s)

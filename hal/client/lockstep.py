@@ -130,5 +130,5 @@ class LockstepLink:
 
 def _pause(deadline_s: float) -> None:
     if time.monotonic() > deadline_s:
-        raise BusError(f"the robot has not answered for {ANSWER_S:.0f} s", "Look whether it still runs.")
+        raise BusError(f"the robot has not answered for {ANSWER_S:.0f} s", "Check that it is still running.")
     time.sleep(POLL_S)

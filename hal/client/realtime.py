@@ -86,7 +86,7 @@ class RealTimeLink:
         deadline_s = time.monotonic() + HEAR_S
         while not self._clock.known:
             if time.monotonic() > deadline_s:
-                raise BusError("the robot says nothing about its wheels", "Look whether it still runs.")
+                raise BusError("the robot says nothing about its wheels", "Check that it is still running.")
             time.sleep(POLL_S)
 
     def stand(self) -> None:

@@ -152,7 +152,7 @@ class _Driver:
             if done():
                 return
             if time.monotonic() > deadline_s:
-                raise BusError(f"'{self.recording.name}' {complaint}", "Look whether it still runs.")
+                raise BusError(f"'{self.recording.name}' {complaint}", "Check that it is still running.")
             time.sleep(SEND_S)
 
     def _listen(self) -> None:

@@ -200,7 +200,7 @@ class ProcessBench:
         deadline_s = time.monotonic() + ANSWER_S
         while not (reports := self._reports.poll()):
             if time.monotonic() > deadline_s:
-                raise StopTestError("the robot says nothing on diagnostics", "Look whether it still runs.")
+                raise StopTestError("the robot says nothing on diagnostics", "Check that it is still running.")
             time.sleep(POLL_S)
         values = [pair for status in reports[-1].message.status for pair in status.values]
         return sum(int(count) for name, count in values if _refusal(name) in reasons)
