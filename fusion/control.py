@@ -14,15 +14,15 @@ from lira.hal.profile import Base
 
 
 class Teacher(Protocol):
-    """Whoever can take the wheel: a script here; a person does the same with a gamepad, from outside."""
+    """Whoever can take control: a script here; a person does the same with a gamepad, from outside."""
 
     def act(
         self, state: CourseState, proposal: Proposal, policy: Policy | None, offers: Mapping[str, Policy]
     ) -> Action | str | None:
-        """Return the human's action, or who shall have the wheel instead, or None while the dead-man is not held.
+        """Return the human's action, or who shall have control instead, or None while the dead-man is not held.
 
         `policy` is what would drive from here on, None before the novice has learned anything; `offers` are the
-        experts that can be given the wheel.
+        experts that can be given control.
         """
 
     def reset(self, layout: int) -> None:
@@ -62,15 +62,15 @@ class ControlLoop:
         self._deadline_s = robot.now()
         self._preprocess = Preprocessor(robot.profile)
         self._reason = Reason.OK  # why the robot did what it did last
-        self._taught = False  # whether the teacher held the wheel at the last step
+        self._taught = False  # whether the teacher had control at the last step
         self.refused = 0  # observations that could not be used
         self.trouble = ""  # what was wrong with the newest observation
 
     def arm(self) -> None:
         """Send the neutral command that a stopped robot asks for before it moves, and let one period pass.
 
-        The teacher's hand, if it was on the wheel, lets go first: else it would be in charge. The command is sent once
-        more if the answer is that the robot stands: a remote one says so first, and is armed by who knows it.
+        The teacher's hand, if it was on the controls, lets go first: else it would be in charge. The command is sent
+        once more if the answer is that the robot stands: a remote one says so first, and is armed by who knows it.
         """
         if self._taught:
             self._teach(None, self._robot.read().seq)

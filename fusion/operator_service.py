@@ -1,4 +1,4 @@
-"""What a person asks of the service, from the pad or the console: pause, go on, start afresh, save, give the wheel.
+"""What a person asks of the service, from the pad or the console: pause, go on, start afresh, save, give control.
 
 Requests are answered between two decisions, each with one line that is printed and sent back. None of them touches
 the governor: the emergency stop and the person's hand work whatever is asked here.
@@ -43,7 +43,7 @@ class RequestLine:
         self._answers.put(OperatorAnswer(now_s, paused, count, accepted, words), now_s)
 
 
-class RequestDesk:
+class OperatorService:
     """Does what is asked between two steps of `loop`. `paused` and `episode` are what the service goes by.
 
     `restart` puts a twin's robot back to the start; None on a real floor. `snapshot` takes what is to be saved as it is
@@ -131,7 +131,7 @@ class RequestDesk:
 
     def _choose(self, name: str) -> tuple[bool, str]:
         if not isinstance(self._method, Chooser):
-            return False, "this method gives no expert the wheel"
+            return False, "this method gives no expert control"
         if self.paused:
             return False, "paused: nobody drives"
         refusal = self._method.choose(name)

@@ -1,4 +1,4 @@
-"""The fusion service on a robot without an arena: it drives, and learns from whoever takes the wheel.
+"""The fusion service on a robot without an arena: it drives, and learns from whoever takes control.
 
 Nothing here re-arms a robot that stopped by itself: a person does that, with the gamepad, by a request or by starting
 anew.
@@ -10,7 +10,7 @@ from threading import Event
 from lira.fusion.control import ControlLoop
 from lira.fusion.log.recorder import Journal
 from lira.fusion.methods.base import Method
-from lira.fusion.operator_service import RequestDesk
+from lira.fusion.operator_service import OperatorService
 from lira.hal.messages import Reason
 
 REARM = "press and release the dead-man (the console's space bar is one), or start lira fusion again"
@@ -32,10 +32,10 @@ def serve(
     say: Callable[[str], None],
     training_steps: Callable[[], int] = lambda: 0,
     *,
-    desk: RequestDesk | None = None,
+    operator_service: OperatorService | None = None,
     layout: int = 0,
 ) -> None:
-    """Run the control loop until `stop` is set; `desk` answers what a person asks between two steps.
+    """Run the control loop until `stop` is set; `operator_service` answers what a person asks between two steps.
 
     `say` gets a line whenever what holds the robot changes.
     """
@@ -46,9 +46,9 @@ def serve(
             method.reset()
             journal.ledger.new_episode()
             say(f"the robot was started anew; what was learned goes on. It stands: {REARM}")
-        if desk is not None:
-            desk.serve()
-            if desk.paused:
+        if operator_service is not None:
+            operator_service.serve()
+            if operator_service.paused:
                 loop.stand()
                 continue
         step = loop.step(method)
@@ -58,5 +58,5 @@ def serve(
             say("driving" if why is None else f"standing still: {why}")
             said = reason
         if step is not None:
-            episode = 0 if desk is None else desk.episode
+            episode = 0 if operator_service is None else operator_service.episode
             journal.note(step, phase="train", lap=episode, layout=layout, training_steps=training_steps())

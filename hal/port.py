@@ -46,7 +46,7 @@ class MotorSwitch(Protocol):
 
 
 @runtime_checkable
-class Herald(Protocol):
+class SensorEvents(Protocol):
     """What a robot may have beside the port: it says when a sensor has something new."""
 
     def wait_news(self, until_s: float) -> None:

@@ -16,7 +16,7 @@ from lira.robot.camera.port import Picture
 from lira.robot.core2.device import Core2
 from lira.robot.rplidar.device import RPLidar
 from lira.robot.settings import Settings
-from lira.robot.supervisor import Keeper
+from lira.robot.supervisor import Supervisor
 
 OPEN_S = 20.0  # a CORE2 boots for 2 s and may speak at three speeds
 BLIND_S = 0.5  # driven on no older scan than this
@@ -34,7 +34,7 @@ class Devices:
 
 
 class Rosbot:
-    """Implements `hal.port.Robot`, `MotorSwitch`, `Herald` and `DeviceMonitor`. Its clock is the monotonic clock.
+    """Implements `hal.port.Robot`, `MotorSwitch`, `SensorEvents` and `DeviceMonitor`. Its clock is the monotonic clock.
 
     A device that is lost ("lidar", "camera", "base") is opened again by itself; to stand meanwhile is the governor's.
     """
@@ -50,14 +50,14 @@ class Rosbot:
         self._open = False
         self.base = Core2(devices.base, devices.settings.base, profile.control.robot_timeout_s)
         self.lidar: RPLidar | None = None
-        self._keepers = {"base": Keeper("base", self.base.session)}
+        self._supervisors = {"base": Supervisor("base", self.base.session)}
         if devices.lidar is not None:
             self.lidar = RPLidar(devices.lidar, profile.lidar, devices.settings.lidar, self._see_scan)
-            self._keepers["lidar"] = Keeper("lidar", self.lidar.session)
+            self._supervisors["lidar"] = Supervisor("lidar", self.lidar.session)
         if devices.camera is not None:
             depth = devices.settings.camera.depth or profile.depth is not None
             camera = CameraDevice(devices.camera, profile.camera, self._see_picture, devices.openni_folder, depth=depth)
-            self._keepers["camera"] = Keeper("camera", camera.session)
+            self._supervisors["camera"] = Supervisor("camera", camera.session)
 
     @property
     def profile(self) -> RobotProfile:
@@ -66,11 +66,11 @@ class Rosbot:
 
     def open(self) -> None:
         """Bring all devices up at once. Raises `DeviceError` for the first that is missing or wrong."""
-        for keeper in self._keepers.values():
-            keeper.start()
+        for supervisor in self._supervisors.values():
+            supervisor.start()
         try:
-            for keeper in self._keepers.values():
-                keeper.wait_alive(OPEN_S)
+            for supervisor in self._supervisors.values():
+                supervisor.wait_alive(OPEN_S)
         except (DeviceError, ConfigError):
             self.close()
             raise
@@ -101,8 +101,10 @@ class Rosbot:
     def device_health(self) -> DeviceHealth:
         """What is lost now, how often anything was, and what it has none of."""
         lost = self._lost()  # before the count: what is lost by now is in it
-        losses = sum(keeper.losses for keeper in self._keepers.values()) + self.base.losses + self._blind_spells
-        return DeviceHealth(lost, losses, tuple(name for name in ("lidar", "camera") if name not in self._keepers))
+        losses = (
+            sum(supervisor.losses for supervisor in self._supervisors.values()) + self.base.losses + self._blind_spells
+        )
+        return DeviceHealth(lost, losses, tuple(name for name in ("lidar", "camera") if name not in self._supervisors))
 
     def now(self) -> float:
         """Seconds on the monotonic clock."""
@@ -121,8 +123,8 @@ class Rosbot:
         """Stop the wheels, then the lidar, and let go of all. May be called twice."""
         self._open = False
         self.base.drive(STOP)
-        for keeper in self._keepers.values():
-            keeper.close()
+        for supervisor in self._supervisors.values():
+            supervisor.close()
 
     def cut_motors(self, off: bool) -> None:
         """Take the motors' power away in the firmware, or give it back: a second emergency stop, below ours."""
@@ -133,13 +135,13 @@ class Rosbot:
         return {name: self._trouble(name) for name in self._lost()}
 
     def _trouble(self, name: str) -> str:
-        failure = self._keepers[name].failure
+        failure = self._supervisors[name].failure
         return str(failure) if failure is not None else f"the {name} is silent. Check its power and plug."
 
     def _lost(self) -> tuple[str, ...]:
         """Which devices do not work now."""
-        lost = [name for name, keeper in self._keepers.items() if not keeper.alive]
-        if "lidar" in self._keepers and "lidar" not in lost and self._is_blind():
+        lost = [name for name, supervisor in self._supervisors.items() if not supervisor.alive]
+        if "lidar" in self._supervisors and "lidar" not in lost and self._is_blind():
             lost.append("lidar")
         if not self.base.answers and "base" not in lost:
             lost.append("base")

@@ -21,7 +21,7 @@ Raises `DeviceError` when it is missing, wrong or lost.
 """
 
 
-class Keeper:
+class Supervisor:
     """Runs sessions of one device, one after the other, until closed. Whatever ends a session, there is a next one."""
 
     def __init__(self, name: str, session: Session) -> None:

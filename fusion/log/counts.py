@@ -36,7 +36,7 @@ class Account(msgspec.Struct, frozen=True):
 class Ledger:
     """Counts over a session. An intervention is a maximal run of steps with the human in control.
 
-    To give an expert the wheel counts as one intervention and one human label.
+    To give an expert control counts as one intervention and one human label.
 
     What the human drives before the first training step is the initial demonstration: its labels are counted apart,
     and it is neither an intervention nor a call.

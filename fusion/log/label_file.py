@@ -59,7 +59,7 @@ class Demonstration:
 
     @property
     def idle(self) -> bool:
-        """Whether the human held the wheel and did nothing."""
+        """Whether the human had control and did nothing."""
         return self.source == "human" and is_rest(self.action)
 
 

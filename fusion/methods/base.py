@@ -37,7 +37,7 @@ class Expert:
 class Choice:
     """One row of the table of Algorithm 1: who drives, with which action, what is learned, how the human is called.
 
-    `given` counts the times the human gave an expert the wheel; 0 where the driver has it by the method's own rules.
+    `given` counts the times the human gave an expert control; 0 where the driver has it by the method's own rules.
     """
 
     driver: str
@@ -57,7 +57,7 @@ class Proposal:
     experts: tuple[ExpertView, ...] = ()
     threshold: float = 0.0
     speed: float = 1.0
-    relieves: bool = False  # a human who holds the wheel is asked to let go: who is proposed takes over
+    relieves: bool = False  # a human who has control is asked to let go: who is proposed takes over
 
     @property
     def command(self) -> Action:
@@ -150,10 +150,10 @@ class Chooser(Protocol):
 
     @property
     def offers(self) -> Mapping[str, Policy]:
-        """Who can be given the wheel."""
+        """Who can be given control."""
 
     def choose(self, name: str) -> str | None:
-        """Give the expert of that name the wheel. Returns why not, None if it drives from now on."""
+        """Give the expert of that name control. Returns why not, None if it drives from now on."""
 
 
 @dataclass(frozen=True, slots=True)

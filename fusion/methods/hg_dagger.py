@@ -29,7 +29,7 @@ class HgDaggerSettings(MethodSettings, frozen=True, tag="hg-dagger"):
 
 
 class HgDagger(Method):
-    """The novice drives; the human takes the wheel when the novice errs. It also trains the experts.
+    """The novice drives; the human takes control when the novice errs. It also trains the experts.
 
     `log`, if there is one, notes how much the novice doubted whenever the human took over; driving alone, the novice
     stops and asks in the phases `doubt`.
@@ -44,7 +44,7 @@ class HgDagger(Method):
         self.reset()
 
     def reset(self) -> None:
-        """Nobody holds the wheel when an episode begins."""
+        """Nobody has control when an episode begins."""
         self._human_drove = False
 
     def propose(self, features: Features) -> Proposal:

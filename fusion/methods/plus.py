@@ -3,7 +3,7 @@
 - Pre-fill: before anybody teaches it, the novice learns what the first expert does while the others are quiet, and
   what active experts agree on.
 - Reservation: an expert's label counts only once a second has passed without the human correcting what the expert did.
-- A choice as an answer: instead of driving, the human may give the wheel to an expert for a while.
+- A choice as an answer: instead of driving, the human may give control to an expert for a while.
 - Sureness: where the experts disagree and the novice says that it knows, it drives, and nobody is called.
 
 Its novice is that of `fusion/kernel.py`.
@@ -28,7 +28,7 @@ class PlusSettings(MethodSettings, frozen=True, tag="plus"):
     lira: LiraSettings = LiraSettings()
     prefill: int = 60  # labels the experts give before the human is asked
     reserve_s: float = 1.0  # an expert's label waits so long for the human's objection
-    wheel_s: float = 1.0  # an expert that was given the wheel keeps it so long
+    handover_s: float = 1.0  # an expert that was given control keeps it so long
     sure: float | None = None  # surer than at all but this share of what the human showed, the novice is not helped
     ask: bool = False  # on unseen layouts it stops and asks where it doubts
 
@@ -43,35 +43,35 @@ class LiraPlus(LiraSpf):
     def __init__(self, experts: Sequence[Expert], novice: Novice, settings: PlusSettings, period_s: float) -> None:
         self._plus = settings
         self._reserve = round(settings.reserve_s / period_s)
-        self._wheel_steps = round(settings.wheel_s / period_s)
+        self._handover_steps = round(settings.handover_s / period_s)
         self._gifts = 0
         super().__init__(experts, novice, settings.lira, period_s)
 
     def reset(self) -> None:
-        """Begin an episode: nobody has been given the wheel, and what is reserved is dropped."""
+        """Begin an episode: nobody has been given control, and what is reserved is dropped."""
         super().reset()
         self._reserved: deque[Proposal] = deque()
-        self._wheel, self._left = "", 0
+        self._driver, self._left = "", 0
 
     @property
     def offers(self) -> Mapping[str, Policy]:
-        """Who can be given the wheel."""
-        return {expert.name: expert.act for expert in self.experts} if self._wheel_steps else {}
+        """Who can be given control."""
+        return {expert.name: expert.act for expert in self.experts} if self._handover_steps else {}
 
     def choose(self, name: str) -> str | None:
-        """Give an expert the wheel for a while. Returns why not, None if it drives from now on."""
+        """Give an expert control for a while. Returns why not, None if it drives from now on."""
         if name not in self.offers:
             return f"there is no expert {name!r} to choose"
-        self._wheel, self._left = name, self._wheel_steps
+        self._driver, self._left = name, self._handover_steps
         self._gifts += 1
         return None
 
     def propose(self, features: Features) -> Proposal:
-        """Algorithm 1, unless an expert was given the wheel, the novice is sure, or all begins."""
+        """Algorithm 1, unless an expert was given control, the novice is sure, or all begins."""
         proposal = super().propose(features)
         if self._left:
-            action = next(view.action for view in proposal.experts if view.name == self._wheel)
-            return replace(proposal, choice=Choice(self._wheel, action, label=action, given=self._gifts), speed=1.0)
+            action = next(view.action for view in proposal.experts if view.name == self._driver)
+            return replace(proposal, choice=Choice(self._driver, action, label=action, given=self._gifts), speed=1.0)
         if self.novice.stored < self._plus.prefill:
             return self._prefill(proposal)
         if proposal.choice.call is not Call.NONE and self.novice.trained and self._sure(features):
@@ -80,7 +80,7 @@ class LiraPlus(LiraSpf):
 
     def learn(self, proposal: Proposal, human: Action | None) -> Lesson:
         """Learn from the human at once, and from an expert when nobody has objected for a while."""
-        objection = human is not None or (proposal.choice.given and self._left == self._wheel_steps)
+        objection = human is not None or (proposal.choice.given and self._left == self._handover_steps)
         dropped = self._drop() if objection else ()
         if human is not None:
             self._left = 0

@@ -125,7 +125,7 @@ METHODS = {
         _plus("plus-no-reserve", approach=PlusSettings(reserve_s=0.0)),
         _plus("plus-no-weight", learning=_M10),
         _plus("plus-no-mirror", mirrored=False),
-        _plus("plus-no-wheel", approach=PlusSettings(wheel_s=0.0)),
+        _plus("plus-no-handover", approach=PlusSettings(handover_s=0.0)),
         _plus("plus-no-cleaning", kernel=KernelSettings(contradicts=None)),
         _plus("plus-no-gain", kernel=KernelSettings(gain=1.0)),
         _plus("plus-network", kernel=None),

@@ -4,8 +4,8 @@ R is the short-term buffer: at every step of a take-over what the human did, and
 have done. An expert whose mean squared error is the least, and less than T^2, drives for u steps, and what it does is
 learned. A press of the human cancels that.
 
-`flexible` compares when the human lets go, `fixed` after two human steps: it then asks for the wheel. Nothing here can
-take the wheel from a hand: who does not let go drives on.
+`flexible` compares when the human lets go, `fixed` after two human steps: it then asks for control. Nothing here can
+take control from a hand: who does not let go drives on.
 """
 
 from collections.abc import Sequence

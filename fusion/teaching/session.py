@@ -136,7 +136,7 @@ class Session:
     def show(self, drives: Sequence[Drive], teacher: Teacher | None = None) -> list[LapRecord]:
         """Let the frozen novice drive, each drive a lap of its own; after a crash it goes on behind it.
 
-        The teacher, if there is one, answers a robot that stands in doubt, and takes the wheel as it would in training.
+        The teacher, if there is one, answers a robot that stands in doubt, and takes control as it would in training.
         """
         return [self._alone([drive], "unseen", lap, teacher) for lap, drive in enumerate(drives, start=1)]
 

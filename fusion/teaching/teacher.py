@@ -39,7 +39,7 @@ class TeacherSettings(Table, frozen=True):
     stall: Share = 0.3  # a policy that drives less than this share of full speed over the horizon stands in the way
     wander_rad: float = 0.1  # a larger turn within the horizon, without a box in the way, is wrong then
     safe_steps: int = 3
-    longest_s: float = 20.0  # after so long at the wheel a hand gives up: whatever it does there does not help
+    longest_s: float = 20.0  # after so long in control a hand gives up: whatever it does there does not help
     turn_rad_s: float = 1.1  # a hand turns a robot no faster, whatever the robot can do
     delay_s: float = 0.6  # median of the log-normal reaction delay
     called_delay_s: float = 0.35
@@ -94,7 +94,7 @@ class ScriptedTeacher:
     def act(
         self, state: CourseState, proposal: Proposal, policy: Policy | None, offers: Mapping[str, Policy] = NOBODY
     ) -> Action | str | None:
-        """Return the action while it holds the wheel, once the name of an expert that shall have it, else None."""
+        """Return the action while it has control, once the name of an expert that shall have it, else None."""
         if policy is None:
             return self._planner.plan(state)  # the initial demonstration: careful and without faults
         danger = self._danger(state, proposal, policy)
@@ -113,7 +113,7 @@ class ScriptedTeacher:
         return self._with_faults(self._planner.plan(state))
 
     def _pick(self, state: CourseState, offers: Mapping[str, Policy]) -> str | None:
-        """An expert that does well from here on, if one can be given the wheel; at times a wrong one."""
+        """An expert that does well from here on, if one can be given control; at times a wrong one."""
         if not offers:
             return None
         if self._random.random() < self._settings.wrong_direction:
@@ -210,5 +210,5 @@ class ScriptedTeacher:
 
 
 def _asks(proposal: Proposal) -> bool:
-    """Whether there is a reason to watch closely: a call, or an expert that was just given the wheel."""
+    """Whether there is a reason to watch closely: a call, or an expert that was just given control."""
     return proposal.choice.call is not Call.NONE or proposal.choice.given > 0

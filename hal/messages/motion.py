@@ -60,7 +60,7 @@ class Command:
 
     `stamp_s` is when it was decided, `answers` the sequence number of the observation it answers (-1: none).
     `released` marks the last command of a commander: the teleop command that follows the release of the dead-man (the
-    wheel goes back to the policy), or a policy's farewell. `commander` is the name on the certificate of whoever
+    control goes back to the policy), or a policy's farewell. `commander` is the name on the certificate of whoever
     commands, "" without keys; `epoch` is their session, which they keep to themselves, and `seq` its count.
     """
 

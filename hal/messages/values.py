@@ -69,7 +69,7 @@ class Request(StrEnum):
     RESUME = "resume"
     RESET = "reset"  # a new episode; on a twin from the start
     SAVE = "save"  # all that was learned, to disk, now
-    WHEEL = "wheel"  # to the expert that is named
+    HANDOVER = "handover"  # to the expert that is named
 
 
 @dataclass(frozen=True, slots=True)

@@ -10,7 +10,7 @@ import msgspec
 
 from lira.hal.clock import is_fresh
 from lira.hal.messages import Applied, Command, LaserScan, Observation, Reason
-from lira.hal.port import DeviceHealth, DeviceMonitor, Herald, MotorSwitch, Robot
+from lira.hal.port import DeviceHealth, DeviceMonitor, MotorSwitch, Robot, SensorEvents
 from lira.hal.profile import Field, RobotProfile
 from lira.hal.safety.arming import State
 from lira.hal.safety.governor import Governor
@@ -104,7 +104,7 @@ class GovernedRobot:
 
     def pass_time(self, until_s: float) -> None:
         """As `wait`, for a server that has its watchdog on another thread; not as long if there is something new."""
-        if isinstance(self._robot, Herald):
+        if isinstance(self._robot, SensorEvents):
             self._robot.wait_news(until_s)
         else:
             self._robot.wait(until_s)

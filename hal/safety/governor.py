@@ -65,7 +65,7 @@ class Governor:
             self._fire(Event.IGNORED)
         elif not _is_finite(command.twist):
             self.refused["not finite"] += 1
-            # A broken policy does not take the wheel out of a person's hand.
+            # A broken policy does not take control out of a person's hand.
             if command.source is Source.TELEOP or not self._hand_on():
                 self._fire(Event.BROKEN)
             self._live.pop(command.source, None)
@@ -163,7 +163,7 @@ class Governor:
         return Event.RESUMED if cut_off else Event.MOTION
 
     def _let_go(self, command: Command, taken: Command) -> None:
-        """Policy or a hand leaves the wheel to others. A hand that had left it before says nothing new."""
+        """Policy or a hand leaves control to others. A hand that had left it before says nothing new."""
         self._leases[command.source].release()
         if command.source is Source.POLICY:
             self._newest[Source.POLICY] = command

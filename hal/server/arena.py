@@ -7,7 +7,7 @@ from lira.hal.bus.bus import Bus
 from lira.hal.bus.services import Info
 from lira.hal.bus.topics import SIM_STATE
 from lira.hal.port import Arena
-from lira.hal.server.info_service import Desk
+from lira.hal.server.info_service import InfoService
 
 POLL_S = 0.005
 
@@ -19,14 +19,14 @@ class ArenaLoop:
         self._arena = arena
         self._now = now
         self._boundary = bus.boundary
-        self._desk = Desk(bus, info, arena, now)
+        self._info_service = InfoService(bus, info, arena, now)
         self._state = bus.publisher(SIM_STATE)
 
     def run(self, stop: threading.Event) -> None:
         """Serve until `stop` is set."""
         due_s = self._now()
         while not stop.wait(POLL_S):
-            self._desk.serve(self._show)
+            self._info_service.serve(self._show)
             if self._now() >= due_s:
                 due_s = self._now() + 1.0 / SIM_STATE.rate_hz
                 self._show()

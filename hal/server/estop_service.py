@@ -18,7 +18,7 @@ from lira.hal.safety.governed import GovernedRobot
 LOOK_S = 0.005
 
 
-class EstopDesk:
+class EstopService:
     """Answers the query, on a thread of its own: neither a sensor nor a slow answer holds it or the wheels up."""
 
     def __init__(self, robot: GovernedRobot, bus: Bus) -> None:

@@ -15,7 +15,7 @@ from lira.hal.port import Arena
 RESETS = 1  # at a time
 
 
-class Desk:
+class InfoService:
     """Answers `info` and, with an arena, `sim/reset`. To be polled by the thread that owns the robot.
 
     The answer to a reset is the robot's time of it, as JSON: what was captured earlier is of the last episode.

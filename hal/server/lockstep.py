@@ -15,8 +15,8 @@ from lira.hal.messages import Clock, Command, Observation
 from lira.hal.port import Arena
 from lira.hal.safety.governed import GovernedRobot
 from lira.hal.server.command_reader import Inlet
-from lira.hal.server.estop_service import EstopDesk
-from lira.hal.server.info_service import Desk
+from lira.hal.server.estop_service import EstopService
+from lira.hal.server.info_service import InfoService
 from lira.hal.server.sensor_publisher import SensorPublisher
 
 REPEAT_S = 1.0  # wall time after which an unanswered observation is sent again, to whoever listens by now
@@ -28,13 +28,13 @@ IDLE_POLL_S = 0.002
 class LockstepLoop:
     """Serves one robot whose time passes only in `wait`."""
 
-    def __init__(self, robot: GovernedRobot, bus: Bus, desk: Desk, arena: Arena | None) -> None:
+    def __init__(self, robot: GovernedRobot, bus: Bus, info_service: InfoService, arena: Arena | None) -> None:
         self._robot = robot
-        self._desk = desk
+        self._info_service = info_service
         self._arena = arena
         self._boundary = bus.boundary
         self._inlet = Inlet(bus)
-        self._estop = EstopDesk(robot, bus)
+        self._estop = EstopService(robot, bus)
         self._sensors = SensorPublisher(bus, robot.profile, lockstep=True)
         self._applied = bus.publisher(APPLIED, IN_LOCKSTEP)
         self._state = bus.publisher(SIM_STATE, IN_LOCKSTEP)
@@ -68,7 +68,7 @@ class LockstepLoop:
         """Wait for the command that answers the observation; None once `stop` is set."""
         since_s = shown_s = time.monotonic()
         while not stop.is_set():
-            self._desk.serve(self._show)
+            self._info_service.serve(self._show)
             self._estop.serve()
             if self._inlet.estop():
                 self._robot.press_estop()

@@ -16,7 +16,7 @@ from lira.hal.messages import Applied, Observation, Reason
 from lira.hal.port import Arena
 from lira.hal.safety.governed import GovernedRobot
 from lira.hal.server.command_reader import Inlet
-from lira.hal.server.info_service import Desk
+from lira.hal.server.info_service import InfoService
 from lira.hal.server.sensor_publisher import SensorPublisher
 
 POLL_S = 0.002  # how long a command may lie
@@ -30,13 +30,13 @@ UNTOLD = 16  # what was applied and could not be told yet, at most
 
 
 class CommandLoop:
-    """Moves the wheels: law 1 stands on this page. Nothing here waits for the bus: `herald` tells what was applied."""
+    """Moves the wheels: law 1 stands on this page. Nothing here waits for the bus: `events` tells what was applied."""
 
-    def __init__(self, robot: GovernedRobot, bus: Bus, herald: "AppliedLoop") -> None:
+    def __init__(self, robot: GovernedRobot, bus: Bus, events: "AppliedLoop") -> None:
         self._robot = robot
         self._inlet = Inlet(bus)
         self._boundary = bus.boundary
-        self._herald = herald
+        self._events = events
 
     def run(self, stop: threading.Event) -> None:
         """Obey and watch until `stop` is set; leaves the wheels at zero, whatever happens."""
@@ -55,7 +55,7 @@ class CommandLoop:
                 if commanded or applied.reason is not told or now_s >= publish_s:
                     publish_s = now_s + 1.0 / APPLIED.rate_hz
                     told = applied.reason
-                    self._herald.offer(applied)
+                    self._events.offer(applied)
         finally:
             self._robot.halt()
 
@@ -106,14 +106,14 @@ class SensorLoop:
         bus: Bus,
         sensors: SensorPublisher,
         pictures: "PictureLoop",
-        desk: Desk,
+        info_service: InfoService,
         arena: Arena | None,
     ) -> None:
         self._robot = robot
         self._sensors = sensors
         self._boundary = bus.boundary
         self._pictures = pictures
-        self._desk = desk
+        self._info_service = info_service
         self._arena = arena
         self._state = bus.publisher(SIM_STATE)
         self._state_due_s = 0.0
@@ -122,7 +122,7 @@ class SensorLoop:
         """Publish until `stop` is set."""
         while not stop.is_set():
             self._show()
-            self._desk.serve(self._show)
+            self._info_service.serve(self._show)
             self._robot.pass_time(self._robot.now() + SENSOR_S)
 
     def _show(self) -> None:

@@ -16,8 +16,8 @@ from lira.hal.errors import BusError
 from lira.hal.port import Arena
 from lira.hal.safety.governed import GovernedRobot
 from lira.hal.server.diagnostics import Reporter
-from lira.hal.server.estop_service import EstopDesk
-from lira.hal.server.info_service import Desk
+from lira.hal.server.estop_service import EstopService
+from lira.hal.server.info_service import InfoService
 from lira.hal.server.instance import only_instance
 from lira.hal.server.lockstep import LockstepLoop
 from lira.hal.server.realtime import JOIN_S, SWITCH_S, AppliedLoop, CommandLoop, PictureLoop, SensorLoop
@@ -69,13 +69,13 @@ class HalServer:
                 "Stop it, or give this one another name.",
             )
 
-    def _desk(self) -> Desk:
-        return Desk(self._bus, self._info, self._arena, self._robot.now)
+    def _info_service(self) -> InfoService:
+        return InfoService(self._bus, self._info, self._arena, self._robot.now)
 
     def _run_lockstep(self, stop: threading.Event) -> None:
         self._robot.open()
         try:
-            loop = LockstepLoop(self._robot, self._bus, self._desk(), self._arena)
+            loop = LockstepLoop(self._robot, self._bus, self._info_service(), self._arena)
             self._ready()
             loop.run(stop)
         finally:
@@ -92,7 +92,7 @@ class HalServer:
             # What opens the devices reads and closes them: some are bound to their thread.
             self._robot.open()
             try:
-                loop = SensorLoop(self._robot, self._bus, publisher, pictures, self._desk(), self._arena)
+                loop = SensorLoop(self._robot, self._bus, publisher, pictures, self._info_service(), self._arena)
                 opened.set()
                 loop.run(wheels_still)
             finally:
@@ -106,7 +106,7 @@ class HalServer:
         wheels = crew.start("commands", lambda: commands.run(stop))
         crew.start("applied", lambda: applied.run(stop))
         crew.start("pictures", lambda: pictures.run(stop))
-        estop = EstopDesk(self._robot, self._bus)
+        estop = EstopService(self._robot, self._bus)
         crew.start("estop", lambda: estop.run(stop))
         reporter = Reporter(self._robot, self._bus)
         crew.start("diagnostics", lambda: reporter.run(stop))

@@ -20,7 +20,7 @@ SILENCE_S = 1.0
 
 
 class CameraDevice:
-    """Hands each picture of the source at `url` to `put`, and with `depth` each depth. `session` is for a `Keeper`.
+    """Hands each picture of the source at `url` to `put`, and with `depth` each depth. `session` is for a `Supervisor`.
 
     Pixels are handed on as they are: the HAL server makes JPEGs of them in a thread of its own, if anybody listens.
     """

@@ -48,7 +48,7 @@ class Counts:
 
 
 class Core2:
-    """Drives the base at `url` and reads it. `session` is for a `Keeper`; the rest may be called from any thread.
+    """Drives the base at `url` and reads it. `session` is for a `Supervisor`; the rest may be called from any thread.
 
     A command is repeated at 20 Hz until there is another, and until it is `timeout_s` old at most: then it sends zero.
     """

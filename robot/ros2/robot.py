@@ -56,7 +56,7 @@ class Interface:
 
 
 class Ros2Robot:
-    """Implements `hal.port.Robot`, `Herald` and `DeviceMonitor`. Its clock is the robot's ROS clock, as stamps tell.
+    """Implements `hal.port.Robot`, `SensorEvents` and `DeviceMonitor`. Its clock is the robot's ROS clock.
 
     Everything that makes it safe happens on this side. `Applied` says what was sent: what the robot's own stack makes
     of it, nobody here knows. Its "lidar" or "camera" is lost while no new scan or picture comes.

@@ -56,7 +56,7 @@ class Mode:
 class RPLidar:
     """Reads turns from a unit at `url` (a serial port, or `socket://host:port`) and hands each scan to `put`.
 
-    `session` is for a `Keeper`. `parsers` read the streams that are understood, the best first.
+    `session` is for a `Supervisor`. `parsers` read the streams that are understood, the best first.
     """
 
     def __init__(

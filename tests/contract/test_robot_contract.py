@@ -19,7 +19,7 @@ def rig(request):
 
 
 def step(rig: Rig, twist: Twist, hand: Twist | None = None, *, released: bool = False) -> Applied:
-    """One period of policy's command, with a hand on the wheel or not."""
+    """One period of policy's command, with a hand on the controls or not."""
     robot = rig.robot
     seq = robot.read().seq
     if hand is not None:

@@ -56,7 +56,7 @@ def test_two_active_experts_in_consensus_drive_with_their_mean_and_call_nobody()
 
 
 def test_two_active_experts_without_consensus_call_for_feedback_while_the_novice_drives():
-    """Regression: read literally, the printed algorithm gives the wheel to one of them."""
+    """Regression: read literally, the printed algorithm gives control to one of them."""
     choice = choose(None, [camera(active=True), lidar(active=True)], NOVICE, T)
     assert (choice.driver, choice.action, choice.label, choice.call) == ("novice", NOVICE, None, Call.FEEDBACK)
 

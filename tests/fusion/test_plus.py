@@ -1,4 +1,4 @@
-"""What `plus` adds to Algorithm 1: pre-fill, reservation, the wheel to an expert, and no call where it is sure."""
+"""What `plus` adds to Algorithm 1: pre-fill, reservation, control to an expert, and no call where it is sure."""
 
 import numpy as np
 import pytest
@@ -15,7 +15,7 @@ PERIOD_S = 0.2
 BINS = 101
 NETWORK = FusionNet(BINS, 16, seed=3)
 CRUISE, LEFT, RIGHT = (1.0, 0.0), (1.0, 0.8), (1.0, -0.8)
-BARE = PlusSettings(prefill=0, reserve_s=0.0, wheel_s=0.0, sure=None)
+BARE = PlusSettings(prefill=0, reserve_s=0.0, handover_s=0.0, sure=None)
 
 
 def seen(brightness=0.5, nearness=1.0):
@@ -119,7 +119,7 @@ class TestPrefill:
 
 class TestReservation:
     def scene(self):
-        scene = Scene(PlusSettings(prefill=0, wheel_s=0.0))
+        scene = Scene(PlusSettings(prefill=0, handover_s=0.0))
         scene.warm()
         scene.camera = LEFT
         return scene
@@ -167,7 +167,7 @@ def taken():
 
 class TestWheel:
     def scene(self):
-        scene = Scene(PlusSettings(prefill=0, reserve_s=0.0, wheel_s=0.6))
+        scene = Scene(PlusSettings(prefill=0, reserve_s=0.0, handover_s=0.6))
         scene.warm()
         return scene
 
@@ -213,7 +213,7 @@ def test_the_human_s_labels_weigh_more():
 
 @pytest.mark.parametrize(("knows", "call"), [(True, Call.NONE), (False, Call.FEEDBACK)])
 def test_where_the_experts_disagree_nobody_is_called_if_the_novice_knows(knows, call):
-    scene = Scene(PlusSettings(prefill=0, reserve_s=0.0, wheel_s=0.0, sure=0.25))
+    scene = Scene(PlusSettings(prefill=0, reserve_s=0.0, handover_s=0.0, sure=0.25))
     scene.novice.knows = lambda _, share: knows and share == 0.25
     scene.warm()
     scene.camera, scene.lidar = LEFT, RIGHT
@@ -224,7 +224,7 @@ def test_where_the_experts_disagree_nobody_is_called_if_the_novice_knows(knows, 
 
 
 def test_a_novice_that_cannot_tell_is_never_sure():
-    scene = Scene(PlusSettings(prefill=0, reserve_s=0.0, wheel_s=0.0, sure=1.0))
+    scene = Scene(PlusSettings(prefill=0, reserve_s=0.0, handover_s=0.0, sure=1.0))
     scene.warm()
     scene.camera, scene.lidar = LEFT, RIGHT
     assert scene.step()[0].choice.call is Call.FEEDBACK

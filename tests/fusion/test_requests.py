@@ -11,7 +11,7 @@ import pytest
 from lira.fusion.control import ControlLoop
 from lira.fusion.log.recorder import Journal
 from lira.fusion.methods.base import Alone
-from lira.fusion.operator_service import RequestDesk, RequestLine
+from lira.fusion.operator_service import OperatorService, RequestLine
 from lira.fusion.service import serve
 from lira.hal.bus.bus import Bus
 from lira.hal.bus.topics import OPERATOR, OPERATOR_ANSWER
@@ -96,7 +96,7 @@ class Service:
         self.line, self.method, self.robot = line, method or Learner(), robot or Drives()
         self.said, self.written = [], []
         journal, loop = Journal(write=self.written.append), ControlLoop(self.robot)
-        self.desk = RequestDesk(line, loop, self.method, journal, self.said.append, **words)
+        self.desk = OperatorService(line, loop, self.method, journal, self.said.append, **words)
         with contextlib.closing(self.desk):
             serve(loop, self.method, journal, line.stop, lambda _: None, desk=self.desk)
 
@@ -210,17 +210,17 @@ def test_where_nothing_is_learned_nothing_is_saved():
     [
         (Choosing(), "camera", True, "camera drives"),
         (Choosing(), "sonar", False, "no expert is called 'sonar'"),
-        (Learner(), "camera", False, "this method gives no expert the wheel"),
+        (Learner(), "camera", False, "this method gives no expert control"),
     ],
 )
 def test_an_expert_gets_the_wheel_if_the_method_can(method, name, accepted, words):
-    service = Service(Script(ask(Request.WHEEL, name)), method)
+    service = Service(Script(ask(Request.HANDOVER, name)), method)
     assert service.method.chosen == ([name] if isinstance(method, Choosing) else [])
     assert (service.line.answers[-1]["accepted"], service.line.answers[-1]["words"]) == (accepted, words)
 
 
 def test_a_paused_service_gives_nobody_the_wheel():
-    service = Service(Script(ask(Request.PAUSE), ask(Request.WHEEL, "camera")), Choosing())
+    service = Service(Script(ask(Request.PAUSE), ask(Request.HANDOVER, "camera")), Choosing())
     assert service.method.chosen == []
     assert service.said[-1] == "operator: paused: nobody drives"
 

@@ -94,7 +94,7 @@ class Pupil:
 
 
 class Hand:
-    """Holds the wheel for the first steps of every episode."""
+    """Holds control for the first steps of every episode."""
 
     def __init__(self, steps=1):
         self.steps, self.left, self.layouts = steps, steps, []

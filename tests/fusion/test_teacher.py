@@ -1,4 +1,4 @@
-"""The scripted teacher: when it takes the wheel and lets go, in a made-up future, and that nothing is hit in a twin."""
+"""The scripted teacher: when it takes control and lets go, in a made-up future, and that nothing is hit in a twin."""
 
 from dataclasses import dataclass, replace
 
@@ -70,7 +70,7 @@ def teacher(crystal, seed=0, **settings):
 
 
 def drive(hand, crystal, dangers, proposal=QUIET):
-    """Return whether it holds the wheel at each step, with danger where `dangers` has an x."""
+    """Return whether it has control at each step, with danger where `dangers` has an x."""
     held = []
     for step, mark in enumerate(dangers):
         crystal.danger = mark == "x"
@@ -177,7 +177,7 @@ WORLD = World(
 
 
 @pytest.mark.parametrize(
-    ("lateral_m", "yaw_rad", "policy", "wheel"),
+    ("lateral_m", "yaw_rad", "policy", "takes"),
     [
         (0.0, 0.0, straight, False),
         (0.6, 0.0, straight, True),  # beside the line, with nothing to drive around
@@ -187,7 +187,7 @@ WORLD = World(
     ],
 )
 def test_a_robot_that_strays_from_a_free_line_turns_back_or_stands_is_in_need_of_help(
-    lateral_m, yaw_rad, policy, wheel
+    lateral_m, yaw_rad, policy, takes
 ):
     foresight = Foresight(PROFILE, WORLD)
     hand = ScriptedTeacher(foresight, PROFILE, PERFECT, seed=0)
@@ -197,7 +197,7 @@ def test_a_robot_that_strays_from_a_free_line_turns_back_or_stands_is_in_need_of
     proposal = replace(QUIET, choice=Choice("novice", policy(FEATURES)))
     action = hand.act(twin.state(), proposal, policy)
     foresight.close()
-    assert (action is not None) == wheel
+    assert (action is not None) == takes
 
 
 @pytest.mark.parametrize("settings", [PERFECT, SKILLED])

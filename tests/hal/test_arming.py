@@ -228,7 +228,7 @@ class Bystander:
     where two speak at once.
 
     A commander may move the robot if, since it stopped last, it has commanded zero; or if it is a hand that takes over
-    from who has, and has not pushed since the stop; or policy, given the wheel by such a hand.
+    from who has, and has not pushed since the stop; or policy, given control by such a hand.
     """
 
     def __init__(self):

@@ -386,7 +386,7 @@ def test_a_commander_that_leaves_disarms_and_makes_room_at_once():
     assert (left.twist, left.reason, desk.governor.state) == (STOP, Reason.NO_COMMAND, State.DISARMED)
     assert desk.at(0.16, by(2, GO, 0.16)).reason is Reason.NEUTRAL_FIRST
     assert desk.at(0.17, by(2, STOP, 0.17)).reason is Reason.OK
-    # It may come back, too: it let go, nobody took the wheel from it.
+    # It may come back, too: it let go, nobody took control from it.
     desk.at(0.2, by(2, STOP, 0.2, released=True))
     assert desk.at(0.25, by(1, STOP, 0.25)).reason is Reason.OK
 

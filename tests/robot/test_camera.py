@@ -19,7 +19,7 @@ from lira.robot.camera.device import CameraDevice, shrink
 from lira.robot.camera.mjpeg import parse_parts
 from lira.robot.camera.source import open_source
 from lira.robot.camera.video import VideoSource
-from lira.robot.supervisor import Keeper
+from lira.robot.supervisor import Supervisor
 from lira.sim_backend.emulators.camera import MjpegServer
 
 CAMERA = load_profile("rosbot2").camera
@@ -43,14 +43,14 @@ class Watch:
     def __init__(self, url, openni=None, depth=False):
         self.pictures, self.depths = [], []
         self.device = CameraDevice(url, CAMERA, self.put, openni, depth=depth)
-        self.keeper = Keeper("camera", self.device.session)
+        self.supervisor = Supervisor("camera", self.device.session)
 
     def __enter__(self):
-        self.keeper.start()
+        self.supervisor.start()
         return self
 
     def __exit__(self, *_):
-        self.keeper.close()
+        self.supervisor.close()
 
     def put(self, picture):
         (self.depths if isinstance(picture, DepthImage) else self.pictures).append(picture)
@@ -58,7 +58,7 @@ class Watch:
     def wait(self, count, timeout_s=6.0):
         until_s = time.monotonic() + timeout_s
         while len(self.pictures) < count:
-            assert time.monotonic() < until_s, self.keeper.failure
+            assert time.monotonic() < until_s, self.supervisor.failure
             time.sleep(0.01)
         return self.pictures[-1]
 
@@ -97,10 +97,10 @@ def test_a_stream_that_ends_is_lost_and_comes_back():
         watch.wait(1)
         server.close()
         until_s = time.monotonic() + 3.0
-        while watch.keeper.alive:
+        while watch.supervisor.alive:
             assert time.monotonic() < until_s
             time.sleep(0.01)
-        assert watch.keeper.failure.remedy
+        assert watch.supervisor.failure.remedy
         again = MjpegServer(server.port)
         again.show(jpeg(70))
         assert watch.wait(2).data == jpeg(70)
@@ -168,7 +168,7 @@ def test_a_picture_that_claims_too_much_is_lost_and_the_next_one_shown(size):
             time.sleep(0.01)
         server.show(jpeg(60))
         assert watch.wait(2).data == jpeg(60)
-        assert watch.keeper.losses == 0
+        assert watch.supervisor.losses == 0
     server.close()
 
 
@@ -178,11 +178,11 @@ def test_a_camera_whose_pictures_cannot_be_read_is_lost_and_says_why(monkeypatch
     server.show(b"<html>no picture</html>")
     with Watch(server.url) as watch:
         until_s = time.monotonic() + 4.0
-        while watch.keeper.failure is None:
+        while watch.supervisor.failure is None:
             server.show(b"<html>no picture</html>")
             assert time.monotonic() < until_s
             time.sleep(0.02)
-        assert "no pictures that can be read: a picture of 23 bytes was refused: no JPEG" in str(watch.keeper.failure)
+        assert "no pictures that can be read: a picture of 23 bytes was refused" in str(watch.supervisor.failure)
         assert not watch.pictures
     server.close()
 
@@ -202,7 +202,7 @@ def test_what_is_no_picture_in_a_folder_is_passed_over(tmp_path):
     (tmp_path / "j.jpg").write_bytes(jpeg(200, (640, 480), noise=1.0)[:70_000])
     with Watch(str(tmp_path)) as watch:
         watch.wait(6)
-        assert watch.keeper.losses == 0
+        assert watch.supervisor.losses == 0
         assert watch.device.unreadable >= 4
     colours = [picture.data for picture in watch.pictures if isinstance(picture, Image)]
     assert colours[0].tolist() == [[[255] * 3] * 4] * 3
@@ -359,10 +359,10 @@ def test_a_camera_that_is_lost_is_opened_again_with_its_depth(openni, monkeypatc
         watch.wait(3)
         monkeypatch.setattr("lira.robot.camera.astra.openni2.wait_for_any_stream", lambda *_: None)  # it says no more
         until_s = time.monotonic() + 3.0
-        while watch.keeper.alive:
+        while watch.supervisor.alive:
             assert time.monotonic() < until_s
             time.sleep(0.01)
-        assert "sends no pictures" in str(watch.keeper.failure)
+        assert "sends no pictures" in str(watch.supervisor.failure)
         monkeypatch.undo()
         depths = len(watch.depths)
         watch.wait(len(watch.pictures) + 10)

@@ -9,7 +9,7 @@ from lira.hal.errors import DeviceError
 from lira.hal.messages import STOP, Odometry, Twist
 from lira.robot.core2.device import Core2
 from lira.robot.settings import BaseSettings
-from lira.robot.supervisor import Keeper
+from lira.robot.supervisor import Supervisor
 from lira.sim_backend.emulators.core2 import Core2Unit, Firmware
 from lira.sim_backend.emulators.rosserial import encode, topic_info
 from lira.sim_backend.emulators.wire import Wire
@@ -27,7 +27,7 @@ class Bench:
         self.unit = Core2Unit(self.drive, self.measure, firmware)
         self.wire = Wire(path, self.unit)
         self.base = Core2(str(path), SETTINGS, timeout_s)
-        self.keeper = Keeper("base", self.base.session)
+        self.supervisor = Supervisor("base", self.base.session)
 
     def drive(self, twist):
         if twist != self.twists[-1]:
@@ -38,12 +38,12 @@ class Bench:
         return Odometry(0.0, 1.0, 2.0, self.yaw_rad, twist.linear_m_s, twist.angular_rad_s)
 
     def __enter__(self):
-        self.keeper.start()
-        self.keeper.wait_alive(5.0)
+        self.supervisor.start()
+        self.supervisor.wait_alive(5.0)
         return self
 
     def __exit__(self, *_):
-        self.keeper.close()
+        self.supervisor.close()
         time.sleep(0.03)
         self.wire.close()
 
@@ -177,7 +177,7 @@ def test_after_a_reset_of_the_board_it_negotiates_anew(tmp_path):
         wait_for(lambda: bench.base.answers, 4.0)
         wait_for(lambda: bench.unit.watchdog)
         assert bench.base.counts.negotiations == 2
-        assert bench.keeper.sessions == 1
+        assert bench.supervisor.sessions == 1
         assert not bench.unit.crashed
 
 
@@ -189,7 +189,7 @@ def test_no_farewell_goes_to_a_board_that_has_announced_nothing_since_it_was_los
         bench.keep(Twist(0.2, 0.0), 0.7)
         zeros = bench.unit.obeyed_unannounced
         assert zeros  # the ones that a silent board gets
-        bench.keeper.close()
+        bench.supervisor.close()
         time.sleep(0.1)
         assert bench.unit.obeyed_unannounced == zeros
         assert bench.twists[-1] == STOP
@@ -204,7 +204,7 @@ def test_what_is_at_the_line_when_it_is_opened_again_gets_requests_only(tmp_path
         bench.unit.reset(0.0)
         bench.wire.mute = True
         bench.wire.plug()
-        wait_for(lambda: "no base board answers" in str(bench.keeper.failure), 8.0)
+        wait_for(lambda: "no base board answers" in str(bench.supervisor.failure), 8.0)
         time.sleep(0.1)
         assert bench.unit.commanded_s == -math.inf
 
@@ -221,11 +221,11 @@ def test_garbage_is_counted_and_survived(tmp_path):
 def test_unplugged_it_says_so_and_comes_back(tmp_path):
     with Bench(tmp_path / "base") as bench:
         bench.wire.unplug()
-        wait_for(lambda: not bench.keeper.alive)
-        assert "was lost" in str(bench.keeper.failure) or "there is no" in str(bench.keeper.failure)
+        wait_for(lambda: not bench.supervisor.alive)
+        assert "was lost" in str(bench.supervisor.failure) or "there is no" in str(bench.supervisor.failure)
         bench.unit.reset()
         bench.wire.plug()
-        wait_for(lambda: bench.keeper.alive, 6.0)
+        wait_for(lambda: bench.supervisor.alive, 6.0)
 
 
 def test_another_layout_of_a_topic_is_named(tmp_path):
@@ -266,5 +266,5 @@ def test_whatever_comes_over_its_line_it_measures_on(running, odd):
     time.sleep(0.05)
     now_s = time.monotonic()
     wait_for(lambda: running.base.answers and running.base.readings.odom.stamp_s > now_s, 10.0)
-    assert running.keeper.losses == 0
+    assert running.supervisor.losses == 0
     assert not running.unit.crashed

@@ -12,7 +12,7 @@ from lira.hal.messages import STOP, Odometry, Twist
 from lira.robot.core2.device import Core2
 from lira.robot.core2.watchdog import WatchdogProcess
 from lira.robot.settings import BaseSettings
-from lira.robot.supervisor import Keeper
+from lira.robot.supervisor import Supervisor
 from lira.sim_backend.emulators.core2 import WATCHDOG_S, Core2Unit, Firmware
 from lira.sim_backend.emulators.wire import Wire
 
@@ -22,11 +22,11 @@ DRIVER = """
 import sys, time
 from lira.hal.messages import Twist
 from lira.robot.core2.device import Core2
-from lira.robot.supervisor import Keeper
+from lira.robot.supervisor import Supervisor
 from lira.robot.settings import BaseSettings
 base = Core2(sys.argv[1], BaseSettings(boot_s=0.15), 0.3)
-keeper = Keeper("base", base.session)
-keeper.start()
+supervisor = Supervisor("base", base.session)
+supervisor.start()
 while True:
     base.drive(Twist(0.2, 0.0))
     time.sleep(0.02)
@@ -116,10 +116,10 @@ def test_who_was_thawed_counts_a_loss_and_stands_for_a_moment(board, tmp_path, m
     for page in ("contact", "device"):  # on a busy machine the emulated board is silent now and then
         monkeypatch.setattr(f"lira.robot.core2.{page}.SILENCE_S", 5.0)
     base = Core2(str(tmp_path / "core2"), BaseSettings(boot_s=0.15), 5.0)
-    keeper = Keeper("base", base.session)
-    keeper.start()
+    supervisor = Supervisor("base", base.session)
+    supervisor.start()
     try:
-        keeper.wait_alive(8.0)
+        supervisor.wait_alive(8.0)
         base.drive(GO)
         board.wait_for(GO)
         time.sleep(0.3)  # given power at the start, the motors stand until the next command
@@ -134,7 +134,7 @@ def test_who_was_thawed_counts_a_loss_and_stands_for_a_moment(board, tmp_path, m
             time.sleep(0.005)
         assert board.wait_for(GO, 4.0) - stood_s > 0.05
     finally:
-        keeper.close()
+        supervisor.close()
 
 
 def test_nobody_drives_without_a_guard(tmp_path):

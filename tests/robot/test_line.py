@@ -12,7 +12,7 @@ from lira.robot.core2.device import Core2
 from lira.robot.rplidar.device import RPLidar
 from lira.robot.serial_port import Line
 from lira.robot.settings import BaseSettings, LidarSettings
-from lira.robot.supervisor import Keeper
+from lira.robot.supervisor import Supervisor
 from lira.sim_backend.emulators.core2 import Core2Unit, Firmware
 from lira.sim_backend.emulators.rplidar import RplidarUnit
 from lira.sim_backend.emulators.wire import Wire
@@ -70,19 +70,19 @@ def test_lidar_and_base_work_behind_serial_servers_and_come_back_after_a_hang_up
     with serial_server(lidar_unit) as (lidar_url, hang_up), serial_server(base_unit) as (base_url, _):
         lidar = RPLidar(lidar_url, load_profile("rosbot2").lidar, LidarSettings(spin_up_s=0.0), scans.append)
         base = Core2(base_url, BaseSettings(boot_s=0.0), 0.3)
-        keepers = [Keeper("lidar", lidar.session), Keeper("base", base.session)]
-        for keeper in keepers:
-            keeper.start()
-        for keeper in keepers:
-            keeper.wait_alive(5.0)
+        supervisors = [Supervisor("lidar", lidar.session), Supervisor("base", base.session)]
+        for supervisor in supervisors:
+            supervisor.start()
+        for supervisor in supervisors:
+            supervisor.wait_alive(5.0)
         wait_for(lambda: len(scans) >= 2)
         hang_up.set()
-        wait_for(lambda: not keepers[0].alive)
-        wait_for(lambda: keepers[0].alive)
+        wait_for(lambda: not supervisors[0].alive)
+        wait_for(lambda: supervisors[0].alive)
         assert base.readings.odom is not None
         base.drive(STOP)
-        for keeper in keepers:
-            keeper.close()
+        for supervisor in supervisors:
+            supervisor.close()
 
 
 def test_nobody_there_is_said_with_the_address():

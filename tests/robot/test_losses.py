@@ -16,7 +16,7 @@ from lira.hal.safety.governed import FIELD_OFF, GovernedRobot
 from lira.robot.core2.board import Readings
 from lira.robot.ros2.robot import Interface, Ros2Robot
 from lira.robot.rosbot import BLIND_S, Devices, Rosbot
-from lira.robot.supervisor import Keeper
+from lira.robot.supervisor import Supervisor
 
 PROFILE = load_profile("rosbot2")
 GO = Twist(0.2, 0.0)
@@ -47,8 +47,8 @@ class Still(Rosbot):
         super().__init__(PROFILE, Devices("/dev/null", lidar))
         self.base, self.time_s, self.scanning, self.near = Base(), 100.0, True, False
         self._open = True
-        for keeper in self._keepers.values():
-            keeper._begin()
+        for supervisor in self._supervisors.values():
+            supervisor._begin()
 
     def now(self):
         return self.time_s
@@ -165,15 +165,15 @@ def test_a_keeper_counts_what_worked_and_was_lost():
         if not stop.is_set():
             raise DeviceError("gone")
 
-    keeper = Keeper("thing", session)
-    keeper.start()
+    supervisor = Supervisor("thing", session)
+    supervisor.start()
     assert begun.acquire(timeout=5.0)
-    assert keeper.losses == 0  # what never worked is not lost
+    assert supervisor.losses == 0  # what never worked is not lost
     ends.set()
     assert begun.acquire(timeout=5.0)
-    assert keeper.losses == 1
+    assert supervisor.losses == 1
     ends.set()
-    keeper.close()
+    supervisor.close()
 
 
 class FarBus:

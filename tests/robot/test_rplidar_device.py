@@ -16,7 +16,7 @@ from lira.hal.profile import load_profile
 from lira.robot.rplidar import protocol
 from lira.robot.rplidar.device import RPLidar
 from lira.robot.settings import LidarSettings
-from lira.robot.supervisor import Keeper
+from lira.robot.supervisor import Supervisor
 from lira.sim_backend.emulators.rplidar import (
     DENSE_MODE,
     EXPRESS_MODE,
@@ -48,21 +48,21 @@ class Bench:
         self.wire = Wire(path, self.unit)
         self.scans = []
         self.driver = RPLidar(str(path), LIDAR, settings, self.scans.append)
-        self.keeper = Keeper("lidar", self.driver.session)
+        self.supervisor = Supervisor("lidar", self.driver.session)
 
     def __enter__(self):
-        self.keeper.start()
+        self.supervisor.start()
         return self
 
     def __exit__(self, *_):
-        self.keeper.close()
+        self.supervisor.close()
         time.sleep(0.05)  # the last words are still on the wire
         self.wire.close()
 
     def wait_scans(self, count, timeout_s=5.0):
         until_s, count = time.monotonic() + timeout_s, len(self.scans) + count
         while len(self.scans) < count:
-            assert time.monotonic() < until_s, self.keeper.failure
+            assert time.monotonic() < until_s, self.supervisor.failure
             time.sleep(0.01)
         return self.scans[-1]
 
@@ -134,7 +134,7 @@ def test_an_error_is_reset_once(tmp_path):
 def test_a_broken_unit_is_refused_with_its_code(tmp_path):
     with Bench(tmp_path / "lidar", Model(broken=True)) as bench:
         with pytest.raises(DeviceError, match="reports error 0x8008") as refused:
-            bench.keeper.wait_alive(5.0)
+            bench.supervisor.wait_alive(5.0)
         assert "turn freely" in refused.value.remedy
 
 
@@ -142,7 +142,7 @@ def test_a_unit_at_no_speed_of_an_rplidar_is_refused(tmp_path):
     bench = Bench(tmp_path / "lidar", Model(baud=9600))
     bench.unit.pwm, bench.unit.mode = 660, STANDARD_MODE  # it streams, so something is heard
     with bench, pytest.raises(DeviceError, match="is no RPLIDAR"):
-        bench.keeper.wait_alive(5.0)
+        bench.supervisor.wait_alive(5.0)
 
 
 def test_garbage_and_loss_are_survived_and_counted(tmp_path):
@@ -154,7 +154,7 @@ def test_garbage_and_loss_are_survived_and_counted(tmp_path):
         bench.wait_scans(5)
         assert bench.driver.counts.lost_bytes >= 300
         assert np.nanmedian([at(scan, 0) for scan in bench.scans[-5:]]) == pytest.approx(1.0, abs=0.02)
-        assert bench.keeper.alive
+        assert bench.supervisor.alive
 
 
 def test_unplugged_it_says_so_and_comes_back_by_itself(tmp_path):
@@ -162,14 +162,14 @@ def test_unplugged_it_says_so_and_comes_back_by_itself(tmp_path):
         bench.wait_scans(1)
         bench.wire.unplug()
         until_s = time.monotonic() + 1.0
-        while bench.keeper.alive:
+        while bench.supervisor.alive:
             assert time.monotonic() < until_s
             time.sleep(0.01)
         bench.unit.mode = None
         bench.wire.plug()
         bench.wait_scans(1, 6.0)
-        assert bench.keeper.alive
-        assert bench.keeper.sessions == 2
+        assert bench.supervisor.alive
+        assert bench.supervisor.sessions == 2
 
 
 def test_a_unit_that_falls_silent_is_lost(tmp_path):
@@ -177,19 +177,19 @@ def test_a_unit_that_falls_silent_is_lost(tmp_path):
         bench.wait_scans(1)
         bench.unit.pwm = 0
         until_s = time.monotonic() + 2.0
-        while bench.keeper.alive:
+        while bench.supervisor.alive:
             assert time.monotonic() < until_s
             time.sleep(0.01)
-        assert "fell silent" in str(bench.keeper.failure)
+        assert "fell silent" in str(bench.supervisor.failure)
 
 
 def test_what_is_missing_or_no_lidar_is_named(tmp_path):
     def failure(path):
-        keeper = Keeper("lidar", RPLidar(str(path), LIDAR, SETTINGS, lambda _: None).session)
-        keeper.start()
+        supervisor = Supervisor("lidar", RPLidar(str(path), LIDAR, SETTINGS, lambda _: None).session)
+        supervisor.start()
         with pytest.raises(DeviceError) as failed:
-            keeper.wait_alive(10.0)
-        keeper.close()
+            supervisor.wait_alive(10.0)
+        supervisor.close()
         return failed.value
 
     assert "there is no" in failure(tmp_path / "nothing").what
@@ -259,4 +259,4 @@ HEADS = st.builds(descriptor, st.integers(0, 2**30 - 1), st.integers(0, 255))
 def test_whatever_comes_over_its_line_it_scans_on(scanning, odd):
     scanning.wire.inject(odd)
     scanning.wait_scans(3, 10.0)
-    assert scanning.keeper.losses == 0
+    assert scanning.supervisor.losses == 0

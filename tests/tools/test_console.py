@@ -35,7 +35,7 @@ from lira.tools.console.keyboard import keyboard_mapping, pad_of
 from lira.tools.console.listen import Ears, decode_picture
 from lira.tools.console.state import View, battery_share, driver_words, operator_words
 from lira.tools.joystick.axes import action_of
-from lira.tools.joystick.client import Wheel
+from lira.tools.joystick.client import TeleopClient
 from lira.tools.launch.processes import ChildProcess, free_port, lira_command
 
 os.environ["SDL_VIDEODRIVER"] = os.environ["SDL_AUDIODRIVER"] = "dummy"
@@ -288,8 +288,8 @@ def test_the_keys_ask_and_say_that_nobody_answers(tmp_path):
         stack.callback(watch.close)
         bus.ask(INFO)
         asked, answers = watch.reader(OPERATOR, depth=16), bus.publisher(OPERATOR_ANSWER)
-        wheel, heard = Wheel(bus, watch, 10.0), []
-        ears, keyboard = Ears(watch, load_profile("thesis-sim")), Keyboard(wheel)
+        client, heard = TeleopClient(bus, watch, 10.0), []
+        ears, keyboard = Ears(watch, load_profile("thesis-sim")), Keyboard(client)
         listened = bus.publisher(OPERATOR)
 
         def press(keys, condition):
@@ -303,7 +303,7 @@ def test_the_keys_ask_and_say_that_nobody_answers(tmp_path):
         def view():
             return replace(ears.look(), unanswered=keyboard.unanswered)
 
-        press("", lambda: keyboard.state == "ready" and wheel.known and listened.matching)
+        press("", lambda: keyboard.state == "ready" and client.known and listened.matching)
         press("p", lambda: heard == [OperatorRequest(Request.PAUSE)])
         press("", lambda: keyboard.unanswered is Request.PAUSE)
         assert operator_words(view()) == ("nobody answers to 'pause': does lira fusion run?", False)
@@ -324,7 +324,7 @@ def test_the_keyboard_drives_locks_without_the_focus_and_comes_back(tmp_path):
         bus.ask(INFO)
         watch = Bus(name, connect=endpoint, watch=True)
         stack.callback(watch.close)
-        keyboard, applied = Keyboard(Wheel(bus, watch, 10.0)), watch.reader(APPLIED)
+        keyboard, applied = Keyboard(TeleopClient(bus, watch, 10.0)), watch.reader(APPLIED)
 
         def press(keys, condition):
             deadline_s = time.monotonic() + 10.0

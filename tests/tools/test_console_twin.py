@@ -12,7 +12,7 @@ from lira.fusion.log.label_log import read_demonstrations
 from lira.hal.bus.bus import Bus
 from lira.hal.bus.topics import APPLIED, DECISION, INFO, OPERATOR_ANSWER
 from lira.hal.messages import Source
-from lira.tools.joystick.client import Wheel
+from lira.tools.joystick.client import TeleopClient
 from lira.tools.launch.processes import ChildProcess, free_port, lira_command
 
 os.environ["SDL_VIDEODRIVER"] = os.environ["SDL_AUDIODRIVER"] = "dummy"
@@ -50,7 +50,7 @@ def typist(name, endpoint):
     bus = Bus(name, connect=endpoint)
     bus.ask(INFO, timeout_s=READY_S)
     watch = Bus(name, connect=endpoint, watch=True)
-    typist = Typist(Keyboard(Wheel(bus, watch, READY_S)))
+    typist = Typist(Keyboard(TeleopClient(bus, watch, READY_S)))
     thread = threading.Thread(target=typist.run, args=[stop])
     thread.start()
     try:

@@ -36,9 +36,9 @@ def asked(states, *, paused=False, step_s=0.1):
         ("BTN_WEST", False, OperatorRequest(Request.PAUSE)),
         ("BTN_WEST", True, OperatorRequest(Request.RESUME)),
         ("BTN_NORTH", False, OperatorRequest(Request.SAVE)),
-        ("BTN_DPAD_UP", False, OperatorRequest(Request.WHEEL, "camera")),
-        ("BTN_DPAD_RIGHT", False, OperatorRequest(Request.WHEEL, "lidar")),
-        ("BTN_DPAD_DOWN", False, OperatorRequest(Request.WHEEL, "expert 3")),
+        ("BTN_DPAD_UP", False, OperatorRequest(Request.HANDOVER, "camera")),
+        ("BTN_DPAD_RIGHT", False, OperatorRequest(Request.HANDOVER, "lidar")),
+        ("BTN_DPAD_DOWN", False, OperatorRequest(Request.HANDOVER, "expert 3")),
     ],
 )
 def test_a_press_asks_once_at_once(button, paused, request_):

@@ -1,4 +1,4 @@
-"""A person on the twin: with nothing else running, and teaching the learner; and how soon a press takes the wheel."""
+"""A person on the twin: with nothing else running, and teaching the learner; and how soon a press takes control."""
 
 import signal
 import time
@@ -163,7 +163,7 @@ def test_a_person_pauses_saves_chooses_and_begins_anew_with_the_pad(bed, hand, w
 
         press(bed, "BTN_DPAD_RIGHT")
         answer = newest(answers, lambda a: a.count == 3)
-        assert (answer.accepted, answer.words) == (False, "this method gives no expert the wheel")
+        assert (answer.accepted, answer.words) == (False, "this method gives no expert control")
 
         press(bed, "BTN_NORTH")
         assert newest(answers, lambda a: a.count == 4).words.startswith("saved ")

@@ -69,7 +69,7 @@ MESSAGES: list[object] = [
     Bool(True),
     Joy(1.5, (0.5, -1.0), (1, 0, 1)),
     OperatorRequest(Request.PAUSE),
-    OperatorRequest(Request.WHEEL, "camera"),
+    OperatorRequest(Request.HANDOVER, "camera"),
     OperatorAnswer(1.5),
     OperatorAnswer(1.5, True, 3, False, "no expert is called 'sonar'"),
     JoyFeedback(JoyFeedback.TYPE_RUMBLE, 10, 0.5),

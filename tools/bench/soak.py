@@ -1,7 +1,7 @@
 """Hours in minutes: a robot at work with all that belongs to it, watched for memory, threads and files that only grow.
 
 `lira twin`, `lira fusion`, the bridge of `lira joystick` and the ears of `lira console` run as they do on a desk. Now
-and then a hand takes the wheel and gives it back, the emergency stop is pressed and released, the robot is put back to
+and then a hand takes control and gives it back, the emergency stop is pressed and released, the robot is put back to
 its start, and somebody joins the bus and leaves. The first fifth is warm-up.
 """
 
@@ -157,7 +157,7 @@ def watch(watched: list[Watched], bus: Bus, ear: int, duration_s: float) -> Work
 
 
 def happen(what: str, bus: Bus, ear: int) -> None:
-    """One of the things that happen on a desk."""
+    """One of the things that happen on a operator_service."""
     if what == "reset":
         bus.ask(RESET, msgspec.json.encode(Episode()))
     elif what == "press":

@@ -26,7 +26,7 @@ from lira.hal.messages import HELD, STOP, Applied, Command, Source, Twist
 from lira.tools.bench import Row, null_robot
 from lira.tools.joystick.axes import AxisRange, PadEvent, PadState
 from lira.tools.joystick.bridge import Bridge
-from lira.tools.joystick.client import Wheel
+from lira.tools.joystick.client import TeleopClient
 from lira.tools.joystick.codes import AXES, BUTTONS, EV_ABS, EV_KEY, EV_SYN
 from lira.tools.joystick.known_pads import PadMemory
 from lira.tools.joystick.mapping import Mapping, load_mapping
@@ -91,7 +91,7 @@ def run() -> list[Row]:
 
 
 def measure(name: str, endpoint: str) -> list[float]:
-    """Take the wheel from a driving policy and give it back, again and again, at moments without a rhythm."""
+    """Take control from a driving policy and give it back, again and again, at moments without a rhythm."""
     mapping, pad, rng = load_mapping("ps3"), PipePad(), random.Random(0)
     taken_ms: list[float] = []
     missed = 0
@@ -123,7 +123,7 @@ def until(reader: Reader[Applied], condition: Callable[[Applied], bool]) -> floa
             if condition(received.message):
                 return received.arrived_s
         time.sleep(POLL_S)
-    raise BusError("the wheel was not handed over", "Is the machine overloaded?")
+    raise BusError("control was not handed over", "Is the machine overloaded?")
 
 
 @contextmanager
@@ -161,7 +161,9 @@ def bridge(name: str, endpoint: str, mapping: Mapping, pad: PipePad) -> Iterator
     """The bridge on that pad."""
     with bus_of(name, endpoint) as bus, bus_of(name, endpoint, watch=True) as watch:
         stop = threading.Event()
-        loop = Bridge(mapping, Wheel(bus, watch, READY_S, lambda _: None), lambda: pad, PadMemory(None), lambda _: None)
+        loop = Bridge(
+            mapping, TeleopClient(bus, watch, READY_S, lambda _: None), lambda: pad, PadMemory(None), lambda _: None
+        )
         with running(lambda: loop.run(stop), stop):
             yield
 

@@ -11,7 +11,7 @@ from lira.tools.console.state import LOW_V, STALE_S, View, battery_share, driver
 SIZE = (1280, 680)  # fits a screen of 1366 by 768 with a desktop's bar and a window's frame
 CALL_WORDS = {
     "attention": ("ATTENTION", "one expert drives: watch it", AMBER, (0, 0, 0)),
-    "feedback": ("YOUR DECISION", "experts disagree: take the wheel", RED, (255, 255, 255)),
+    "feedback": ("YOUR DECISION", "experts disagree: take control", RED, (255, 255, 255)),
 }
 BANNER = pygame.Rect(560, 108, 704, 84)
 

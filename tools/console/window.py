@@ -15,7 +15,7 @@ from lira.tools.console.draw import SIZE, draw
 from lira.tools.console.keyboard import keyboard_mapping, pad_of
 from lira.tools.console.state import View
 from lira.tools.joystick.axes import PadState
-from lira.tools.joystick.client import Wheel
+from lira.tools.joystick.client import TeleopClient
 from lira.tools.joystick.deadman import Hand, State
 from lira.tools.joystick.requests import RequestButtons
 
@@ -40,14 +40,14 @@ KEYS = {
 
 
 class Keyboard:
-    """The keyboard's hand on the wheel, and what it asks; a window without the focus is a pad that is lost.
+    """The keyboard's hand on the controls, and what it asks; a window without the focus is a pad that is lost.
 
     `unanswered` is the newest request if nobody answered it; `confirmed` whether the robot says that the emergency stop
     holds which was pressed here.
     """
 
-    def __init__(self, wheel: Wheel) -> None:
-        self._wheel = wheel
+    def __init__(self, client: TeleopClient) -> None:
+        self._client = client
         self._hand = Hand(keyboard_mapping())
         self._buttons = RequestButtons(keyboard_mapping())
         self.unanswered: Request | None = None
@@ -60,28 +60,28 @@ class Keyboard:
     @property
     def confirmed(self) -> bool:
         """Whether the robot has acknowledged the emergency stop."""
-        return self._wheel.confirmed
+        return self._client.confirmed
 
     def update(self, pressed: frozenset[str] | None) -> None:
         """Send what the keys order; None without the focus."""
-        self._wheel.listen()
+        self._client.listen()
         now_s = time.monotonic()
         pad = None if pressed is None else pad_of(pressed)
         order = self._hand.update(pad, now_s)
         if order.estop is not None:
-            self._wheel.estop(order.estop)
+            self._client.estop(order.estop)
         if order.action is not None:
-            self._wheel.drive(order.action, order.released, now_s)
+            self._client.drive(order.action, order.released, now_s)
         self._ask(pad, now_s)
 
     def _ask(self, pad: PadState | None, now_s: float) -> None:
-        self._wheel.decisions()
-        if self._wheel.answers():
+        self._client.decisions()
+        if self._client.answers():
             self.unanswered = None
-        for request in self._buttons.update(pad, now_s, paused=self._wheel.paused, experts=self._wheel.experts):
-            self._wheel.ask(request, now_s)
+        for request in self._buttons.update(pad, now_s, paused=self._client.paused, experts=self._client.experts):
+            self._client.ask(request, now_s)
             self.unanswered = None
-        self.unanswered = self._wheel.unanswered(now_s) or self.unanswered
+        self.unanswered = self._client.unanswered(now_s) or self.unanswered
 
 
 def save_picture(view: View, path: str) -> None:

@@ -9,7 +9,7 @@ from typing import Protocol
 from lira.hal.errors import DeviceError
 from lira.hal.messages import Applied, Reason
 from lira.tools.joystick.axes import PadState
-from lira.tools.joystick.client import Wheel
+from lira.tools.joystick.client import TeleopClient
 from lira.tools.joystick.deadman import Hand, Order, State
 from lira.tools.joystick.freeze import FreezeWatch
 from lira.tools.joystick.known_pads import PadMemory
@@ -24,7 +24,7 @@ WORDS = {
     State.LOCKED: "hands off: let go of the dead-man and centre the sticks to begin",
     State.READY: "ready: hold the dead-man to drive",
     State.DRIVING: "you drive",
-    State.RESTING: "you gave the wheel back",
+    State.RESTING: "you gave control back",
     State.HOLDING: "stopped: the robot stands until a hand comes back",
 }
 
@@ -64,13 +64,13 @@ class Bridge:
     def __init__(
         self,
         mapping: Mapping,
-        wheel: Wheel,
+        client: TeleopClient,
         find: Callable[[], OpenPad | None],
         memory: PadMemory,
         say: Callable[[str], None] = print,
     ) -> None:
         self._mapping = mapping
-        self._wheel = wheel
+        self._client = client
         self._open_pad = find
         self._memory = memory
         self._say = say
@@ -89,13 +89,13 @@ class Bridge:
             self._tell("no pad is there: plug one in, or press its PS button")
 
     def run(self, stop: threading.Event) -> None:
-        """Go on until `stop` is set; then let the robot stand if a hand was on the wheel."""
+        """Go on until `stop` is set; then let the robot stand if a hand was on the controls."""
         try:
             while not stop.is_set():
                 self._step()
         finally:
             if self._sent.action is not None:
-                self._wheel.drive((0.0, 0.0), self._sent.released, time.monotonic())
+                self._client.drive((0.0, 0.0), self._sent.released, time.monotonic())
             if self._pad is not None:
                 self._remember(self._pad)
                 self._pad.close()
@@ -134,12 +134,12 @@ class Bridge:
         return states
 
     def _tick(self, now_s: float) -> None:
-        applied = self._wheel.listen()
+        applied = self._client.listen()
         if self._pad is None and now_s >= self._search_s:
             self._search()
         self._order(None if self._pad is None else self._pad.state, now_s, tick=True)
         if self._pad is not None and self._is_alive():
-            self._wheel.show(*_joy(self._pad.state, self._mapping), now_s)
+            self._client.show(*_joy(self._pad.state, self._mapping), now_s)
         self._feel(now_s)
         self._explain(applied)
         self._hear(now_s)
@@ -150,14 +150,14 @@ class Bridge:
         watched = before in (State.DRIVING, State.LOCKED)
         order = self._hand.update(state, now_s, not watched or self._is_alive())
         if order.estop is not None:
-            self._wheel.estop(order.estop)
+            self._client.estop(order.estop)
         pressed = state if self._is_alive() else None
-        wheel = self._wheel
-        for request in self._buttons.update(pressed, now_s, paused=wheel.paused, experts=wheel.experts):
-            wheel.ask(request, now_s)
+        client = self._client
+        for request in self._buttons.update(pressed, now_s, paused=client.paused, experts=client.experts):
+            client.ask(request, now_s)
         changed = self._hand.state is not before
         if order.action is not None and (tick or changed):
-            self._wheel.drive(order.action, order.released, now_s)
+            self._client.drive(order.action, order.released, now_s)
         self._sent = order
         if changed:
             if before is State.DRIVING and state is not None and not self._is_alive():
@@ -201,18 +201,18 @@ class Bridge:
 
     def _hear(self, now_s: float) -> None:
         """Pass on what was answered to requests."""
-        for answer in self._wheel.answers():
+        for answer in self._client.answers():
             self._say(f"learner: {answer.words}")
             if answer.accepted:
                 self._rumble.play(TAKEN, now_s)
-        if (request := self._wheel.unanswered(now_s)) is not None:
+        if (request := self._client.unanswered(now_s)) is not None:
             self._say(f"nobody answers to '{request}': does lira fusion run?")
 
     def _feel(self, now_s: float) -> None:
         """Rumble for what was asked on `joy/feedback`, and for the learner's calls as they begin."""
-        for message in self._wheel.feedback():
+        for message in self._client.feedback():
             self._rumble.play(pattern_of(message), now_s)
-        for decision in self._wheel.decisions():
+        for decision in self._client.decisions():
             if decision.calls > self._calls and decision.call in CALLS:
                 self._rumble.play(CALLS[decision.call], now_s)
             self._calls = decision.calls

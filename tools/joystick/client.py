@@ -29,8 +29,8 @@ DEPTH = 16
 ANSWER_S = 2.0  # after that nobody will answer a request
 
 
-class Wheel:
-    """One robot's wheel: commands go over `bus`; `watch`, a watching bus, hears who calls.
+class TeleopClient:
+    """One robot's controls: commands go over `bus`; `watch`, a watching bus, hears who calls.
 
     Raises `BusError` if no robot answers, or one in lockstep: nobody's hand is that fast.
     """

@@ -5,7 +5,7 @@
 | locked | nothing | the dead-man is up and the sticks rest |
 | ready | nothing | the dead-man is pressed |
 | driving | the sticks | the dead-man is let go, the pad is lost, or the emergency stop is pressed |
-| resting | zeros that give the wheel back | 0.5 s are over: one zero may be lost |
+| resting | zeros that give control back | 0.5 s are over: one zero may be lost |
 | holding | zeros that do not give it back | 0.5 s are over, then silence: the robot stands until a hand comes back |
 """
 
@@ -80,7 +80,7 @@ TRANSITIONS: dict[tuple[State, Event], State] = {
 
 @dataclass(frozen=True, slots=True)
 class Order:
-    """What to send now: an action (None: nothing), whether it gives the wheel back, and the emergency stop.
+    """What to send now: an action (None: nothing), whether it gives control back, and the emergency stop.
 
     `estop` is True at a press, False at a release, None otherwise.
     """
@@ -140,7 +140,7 @@ class Hand:
             yield Event.LET_GO
 
     def _estop(self, pad: PadState | None, now_s: float) -> bool | None:
-        """The edge of a press, or of a release that has been held long enough with the hand off the wheel."""
+        """The edge of a press, or of a release that has been held long enough with the hand off the controls."""
         held = pad is not None and any(pad.holds(name) for name in self._mapping.estop)
         # PS also switches a pad on: one that comes with it held has not been asked to stop.
         pressed = held and not self._stop_held and self._is_there

@@ -23,7 +23,7 @@ class Axis(Table, frozen=True):
 class Mapping(Table, frozen=True):
     """One kind of pad. Controls go by their names in linux/input-event-codes.h; see `pads/ps3.toml` for what each does.
 
-    What `pause`, `reset`, `save` and `experts` (who gets the wheel) ask is not for every pad: they may be left out.
+    What `pause`, `reset`, `save` and `experts` (who gets control) ask is not for every pad: they may be left out.
     `freeze` says that a live pad of this kind is never silent. `axes` and `buttons` are the order of `joy`.
     """
 

@@ -23,7 +23,7 @@ class RequestButtons:
     ) -> list[OperatorRequest]:
         """Take the pad's state in (None: it is gone or frozen) and return what is asked now.
 
-        `paused` is what a press of pause ends, `experts` who gets the wheel, in the order of the buttons. A button that
+        `paused` is what a press of pause ends, `experts` who gets control, in the order of the buttons. A button that
         is pressed while the pad comes asks nothing.
         """
         if pad is None:
@@ -48,4 +48,4 @@ class RequestButtons:
         if name in (mapping.reset, mapping.save):
             return OperatorRequest(Request.RESET if name == mapping.reset else Request.SAVE)
         index = mapping.experts.index(name)
-        return OperatorRequest(Request.WHEEL, experts[index] if index < len(experts) else f"expert {index + 1}")
+        return OperatorRequest(Request.HANDOVER, experts[index] if index < len(experts) else f"expert {index + 1}")

@@ -1,4 +1,4 @@
-"""Learning from a person, and showing them a policy: they may take the wheel at any time, and ask for things."""
+"""Learning from a person, and showing them a policy: they may take control at any time, and ask for things."""
 
 import argparse
 import contextlib
@@ -13,7 +13,7 @@ from lira.fusion.learning.labels import Label
 from lira.fusion.log.label_log import DemonstrationLog, read_demonstrations
 from lira.fusion.log.recorder import Journal
 from lira.fusion.log.run_log import RunWriter
-from lira.fusion.operator_service import RequestDesk, RequestLine
+from lira.fusion.operator_service import OperatorService, RequestLine
 from lira.fusion.service import serve
 from lira.hal.bus.bus import Bus
 from lira.hal.client.remote import RemoteArena, RemoteRobot
@@ -30,17 +30,17 @@ def show_policy(args: argparse.Namespace, robot: RemoteRobot, publish: Publish, 
     method = load_alone(args.policy, robot.profile, args.experts or task_of(world_of(robot)), ask=args.ask)
     journal, loop = Journal(publish=publish), ControlLoop(robot)
     with stop_or_interrupt() as stop, request_line(robot, args) as line:
-        desk = RequestDesk(line, loop, method, journal, say, restart=restarter(robot, args))
+        service = OperatorService(line, loop, method, journal, say, restart=restarter(robot, args))
         loop.arm()
         say(f"'{args.policy}' drives '{args.name}'; stop with Ctrl-C")
-        serve(loop, method, journal, stop, say, desk=desk)
+        serve(loop, method, journal, stop, say, operator_service=service)
     return 0
 
 
 def learn_from_person(
     args: argparse.Namespace, plan: Plan, robot: RemoteRobot, trainer: NewTrainer, publish: Publish, say: Say
 ) -> int:
-    """Learn from whoever takes the wheel with the dead-man, until Ctrl-C; then, or when it fails, save the novice."""
+    """Learn from whoever takes control with the dead-man, until Ctrl-C; then, or when it fails, save the novice."""
     profile, world = robot.profile, world_of(robot)
     head, folder = plan.head(profile, world), plan.folder
     assert folder is not None
@@ -58,7 +58,7 @@ def learn_from_person(
                     novice.remember(Label(old.scan, old.image, old.action, old.source, novice.weight(old.source)))
             journal, loop = Journal(keep=log.append, write=record.write, publish=publish), ControlLoop(robot)
             with stop_or_interrupt() as stop, request_line(robot, args) as line:
-                desk = RequestDesk(
+                service = OperatorService(
                     line,
                     loop,
                     method,
@@ -69,9 +69,16 @@ def learn_from_person(
                 )
                 loop.arm()
                 say(f"{args.method} learns on '{args.name}' with {novice.stored} labels; hold the dead-man to drive")
-                with contextlib.closing(desk):
+                with contextlib.closing(service):
                     serve(
-                        loop, method, journal, stop, say, lambda: novice.training_steps, desk=desk, layout=args.layout
+                        loop,
+                        method,
+                        journal,
+                        stop,
+                        say,
+                        lambda: novice.training_steps,
+                        operator_service=service,
+                        layout=args.layout,
                     )
     return 0
 

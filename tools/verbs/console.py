@@ -2,7 +2,7 @@
 
 It only looks, in a process of its own: closing it changes nothing. Without a gamepad the keyboard drives: hold SPACE
 and use the arrows (SHIFT: full speed), Esc is the emergency stop, F1 held for a second releases it. P pauses driving
-and learning and goes on, S saves, R held for a second begins a new episode, 1 to 4 give the wheel to an expert.
+and learning and goes on, S saves, R held for a second begins a new episode, 1 to 4 give control to an expert.
 
 examples:
   lira console
@@ -46,7 +46,7 @@ def run(args: argparse.Namespace) -> int:
     from lira.hal.bus.services import LOCKSTEP, info_from_json
     from lira.hal.bus.topics import INFO
     from lira.tools.console.listen import Ears
-    from lira.tools.joystick.client import Wheel
+    from lira.tools.joystick.client import TeleopClient
 
     with contextlib.ExitStack() as stack:
         bus = Bus(args.name, connect=args.connect)
@@ -56,7 +56,7 @@ def run(args: argparse.Namespace) -> int:
         watch = Bus(args.name, connect=args.connect, watch=True)
         stack.callback(watch.close, CLOSE_S)
         by_hand = info.mode != LOCKSTEP and not args.no_keyboard  # no hand follows lockstep
-        keyboard = Keyboard(Wheel(bus, watch, ANSWER_S)) if by_hand else None
+        keyboard = Keyboard(TeleopClient(bus, watch, ANSWER_S)) if by_hand else None
         print(f"console shows '{args.name}' at {args.connect}", flush=True)
         show(Ears(watch, info.profile).look, keyboard, stop)
     return 0

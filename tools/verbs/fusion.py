@@ -143,7 +143,7 @@ def show(args: argparse.Namespace, robot: "RemoteRobot") -> int:
 
 
 def learn_by_hand(args: argparse.Namespace, plan: "Plan", robot: "RemoteRobot") -> int:
-    """Learn from whoever takes the wheel."""
+    """Learn from whoever takes control."""
     from lira.fusion.learning.trainer import ProcessTrainer
     from lira.tools.runs.with_person import learn_from_person
 

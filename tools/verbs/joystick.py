@@ -1,8 +1,8 @@
 """Drive by hand: a gamepad on this machine, straight to the robot. Needs no screen.
 
 Hold the dead-man (L1) to drive with the left stick, turbo (R1) for full speed. PS or SELECT is the emergency stop;
-START, held for a second, releases it. Letting go of the dead-man gives the wheel back at once. Square pauses and goes
-on, triangle saves, circle, held for a second, begins anew; the d-pad gives the wheel to an expert.
+START, held for a second, releases it. Letting go of the dead-man gives control back at once. Square pauses and goes
+on, triangle saves, circle, held for a second, begins anew; the d-pad gives control to an expert.
 
 examples:
   lira joystick                                     the first pad that has the controls of a PS3 pad
@@ -49,7 +49,7 @@ def run(args: argparse.Namespace) -> int:
     from lira.hal.bus.bus import Bus
     from lira.hal.bus.topics import INFO
     from lira.tools.joystick.bridge import Bridge
-    from lira.tools.joystick.client import Wheel
+    from lira.tools.joystick.client import TeleopClient
     from lira.tools.joystick.known_pads import PadMemory, state_file
 
     bus, watch = Bus(args.name, connect=args.connect), None
@@ -57,8 +57,8 @@ def run(args: argparse.Namespace) -> int:
         with stop_or_interrupt() as stop:
             bus.ask(INFO, timeout_s=ANSWER_S)
             watch = Bus(args.name, connect=args.connect, watch=True)
-            wheel = Wheel(bus, watch, ANSWER_S, say)
-            bridge = Bridge(mapping, wheel, Finder(mapping, args.device), PadMemory(state_file(), say), say)
+            client = TeleopClient(bus, watch, ANSWER_S, say)
+            bridge = Bridge(mapping, client, Finder(mapping, args.device), PadMemory(state_file(), say), say)
             say(f"joystick drives '{args.name}' at {args.connect}; stop with Ctrl-C")
             bridge.run(stop)
     finally:

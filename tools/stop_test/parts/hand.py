@@ -13,7 +13,7 @@ from lira.hal.bus.bus import Bus
 from lira.hal.bus.topics import INFO
 from lira.tools.bench.takeover import PipePad
 from lira.tools.joystick.bridge import Bridge
-from lira.tools.joystick.client import Wheel
+from lira.tools.joystick.client import TeleopClient
 from lira.tools.joystick.codes import AXES, BUTTONS, EV_ABS, EV_KEY
 from lira.tools.joystick.known_pads import PadMemory
 from lira.tools.joystick.mapping import load_mapping
@@ -44,8 +44,8 @@ def main(name: str, endpoint: str, control_port: int) -> None:
     bus = Bus(name, connect=endpoint)
     bus.ask(INFO)
     watch = Bus(name, connect=endpoint, watch=True)
-    wheel = Wheel(bus, watch, ANSWER_S)
-    bridge = Bridge(mapping, wheel, lambda: pad, PadMemory(None))
+    client = TeleopClient(bus, watch, ANSWER_S)
+    bridge = Bridge(mapping, client, lambda: pad, PadMemory(None))
     listen(control_port, hear)
     print(READY, flush=True)
     try:
