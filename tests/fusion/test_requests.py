@@ -91,14 +91,14 @@ class Choosing(Learner):
         return None if name == "camera" else f"no expert is called '{name}'"
 
 
-class Service:
+class Run:
     def __init__(self, line, method=None, robot=None, **words):
         self.line, self.method, self.robot = line, method or Learner(), robot or Drives()
         self.said, self.written = [], []
         journal, loop = Journal(write=self.written.append), ControlLoop(self.robot)
-        self.desk = OperatorService(line, loop, self.method, journal, self.said.append, **words)
-        with contextlib.closing(self.desk):
-            serve(loop, self.method, journal, line.stop, lambda _: None, desk=self.desk)
+        self.service = OperatorService(line, loop, self.method, journal, self.said.append, **words)
+        with contextlib.closing(self.service):
+            serve(loop, self.method, journal, line.stop, lambda _: None, operator_service=self.service)
 
     @property
     def laps(self):
@@ -110,62 +110,62 @@ GO_TWIST = Twist(0.5, 0.0)
 
 def test_paused_it_stands_learns_nothing_and_goes_on_after_a_neutral_command():
     line = Script([], ask(Request.PAUSE), [], ask(Request.PAUSE), ask(Request.RESUME), [])
-    service = Service(line)
+    run = Run(line)
     # One step, three paused ones, a neutral command, two steps.
-    assert service.robot.twists == [GO_TWIST, STOP, STOP, STOP, STOP, GO_TWIST, GO_TWIST]
-    assert len(service.written) == 3
-    assert service.method.resets == 1
+    assert run.robot.twists == [GO_TWIST, STOP, STOP, STOP, STOP, GO_TWIST, GO_TWIST]
+    assert len(run.written) == 3
+    assert run.method.resets == 1
     assert [answer["paused"] for answer in line.answers] == [False, True, True, False]
     assert [answer["count"] for answer in line.answers] == [0, 1, 2, 3]
-    assert service.said[0].startswith("operator: paused: the robot stands")
-    assert service.said[-1] == "operator: it drives and learns again"
+    assert run.said[0].startswith("operator: paused: the robot stands")
+    assert run.said[-1] == "operator: it drives and learns again"
 
 
 def test_to_go_on_when_nothing_was_paused_changes_nothing():
-    service = Service(Script([], ask(Request.RESUME), []))
-    assert service.robot.twists == [GO_TWIST] * 3
-    assert service.method.resets == 0
+    run = Run(Script([], ask(Request.RESUME), []))
+    assert run.robot.twists == [GO_TWIST] * 3
+    assert run.method.resets == 0
 
 
 def test_a_pause_does_not_arm_a_robot_that_stopped_by_itself_and_the_person_who_ends_it_does():
     robot = Drives()
     robot.held = Reason.STALE
-    service = Service(Script([], ask(Request.PAUSE), [], ask(Request.RESUME)), robot=robot)
+    run = Run(Script([], ask(Request.PAUSE), [], ask(Request.RESUME)), robot=robot)
     # What was refused; the neutral command at the end, once more since it is not obeyed; the next.
-    assert service.robot.twists == [GO_TWIST, STOP, STOP, GO_TWIST]
+    assert run.robot.twists == [GO_TWIST, STOP, STOP, GO_TWIST]
 
 
 def test_a_reset_puts_a_twin_back_and_begins_an_episode_after_a_neutral_command():
     starts = []
-    service = Service(Script([], ask(Request.RESET), []), restart=lambda: starts.append(len(starts)))
+    run = Run(Script([], ask(Request.RESET), []), restart=lambda: starts.append(len(starts)))
     assert starts == [0]
-    assert service.robot.twists == [GO_TWIST, STOP, STOP, GO_TWIST, GO_TWIST]
-    assert service.laps == [0, 1, 1]
-    assert service.method.resets == 1
-    assert service.said == ["operator: episode 1 begins, back at the start"]
+    assert run.robot.twists == [GO_TWIST, STOP, STOP, GO_TWIST, GO_TWIST]
+    assert run.laps == [0, 1, 1]
+    assert run.method.resets == 1
+    assert run.said == ["operator: episode 1 begins, back at the start"]
 
 
 def test_on_a_real_floor_a_reset_is_a_mark():
-    service = Service(Script(ask(Request.RESET), ask(Request.RESET)))
-    assert service.laps == [1, 2]
-    assert service.said == ["operator: episode 1 begins here", "operator: episode 2 begins here"]
+    run = Run(Script(ask(Request.RESET), ask(Request.RESET)))
+    assert run.laps == [1, 2]
+    assert run.said == ["operator: episode 1 begins here", "operator: episode 2 begins here"]
 
 
 def test_a_reset_while_paused_leaves_it_paused():
-    service = Service(Script(ask(Request.PAUSE), ask(Request.RESET), []), restart=lambda: None)
-    assert set(service.robot.twists) == {STOP}
-    assert service.desk.paused
-    assert service.written == []
+    run = Run(Script(ask(Request.PAUSE), ask(Request.RESET), []), restart=lambda: None)
+    assert set(run.robot.twists) == {STOP}
+    assert run.service.paused
+    assert run.written == []
 
 
 def test_a_reset_that_fails_is_refused_and_the_episode_goes_on():
     def restart():
         raise BusError("the twin is gone", "Start it.")
 
-    service = Service(Script(ask(Request.RESET), []), restart=restart)
-    assert service.line.answers[-1]["accepted"] is False
-    assert service.said == ["operator: not reset: the twin is gone. Start it."]
-    assert service.laps == [0, 0]
+    run = Run(Script(ask(Request.RESET), []), restart=restart)
+    assert run.line.answers[-1]["accepted"] is False
+    assert run.said == ["operator: not reset: the twin is gone. Start it."]
+    assert run.laps == [0, 0]
 
 
 def test_what_is_saved_is_taken_at_once_and_written_aside():
@@ -184,25 +184,25 @@ def test_what_is_saved_is_taken_at_once_and_written_aside():
 
     line = Script(ask(Request.SAVE), ask(Request.SAVE), [])
     line.stop.set = lambda real=line.stop.set: (gate.set(), real())
-    service = Service(line, snapshot=snapshot)
-    assert len(service.written) == 3  # it drove on meanwhile
+    run = Run(line, snapshot=snapshot)
+    assert len(run.written) == 3  # it drove on meanwhile
     assert written == [0]
     assert threads.isdisjoint({threading.main_thread()})
-    assert service.said == ["operator: saved"]
+    assert run.said == ["operator: saved"]
 
 
 def test_a_disk_that_is_full_is_said_and_it_drives_on():
     def write():
         raise StorageError("cannot write novice", "Free some space.")
 
-    service = Service(Script(ask(Request.SAVE), [], []), snapshot=lambda: write)
-    assert service.said == ["operator: not saved: cannot write novice. Free some space."]
-    assert service.line.answers[-1]["accepted"] is False
-    assert len(service.written) == 3
+    run = Run(Script(ask(Request.SAVE), [], []), snapshot=lambda: write)
+    assert run.said == ["operator: not saved: cannot write novice. Free some space."]
+    assert run.line.answers[-1]["accepted"] is False
+    assert len(run.written) == 3
 
 
 def test_where_nothing_is_learned_nothing_is_saved():
-    assert "nothing is learned here" in Service(Script(ask(Request.SAVE))).said[0]
+    assert "nothing is learned here" in Run(Script(ask(Request.SAVE))).said[0]
 
 
 @pytest.mark.parametrize(
@@ -214,22 +214,22 @@ def test_where_nothing_is_learned_nothing_is_saved():
     ],
 )
 def test_an_expert_gets_the_wheel_if_the_method_can(method, name, accepted, words):
-    service = Service(Script(ask(Request.HANDOVER, name)), method)
-    assert service.method.chosen == ([name] if isinstance(method, Choosing) else [])
-    assert (service.line.answers[-1]["accepted"], service.line.answers[-1]["words"]) == (accepted, words)
+    run = Run(Script(ask(Request.HANDOVER, name)), method)
+    assert run.method.chosen == ([name] if isinstance(method, Choosing) else [])
+    assert (run.line.answers[-1]["accepted"], run.line.answers[-1]["words"]) == (accepted, words)
 
 
 def test_a_paused_service_gives_nobody_the_wheel():
-    service = Service(Script(ask(Request.PAUSE), ask(Request.HANDOVER, "camera")), Choosing())
-    assert service.method.chosen == []
-    assert service.said[-1] == "operator: paused: nobody drives"
+    run = Run(Script(ask(Request.PAUSE), ask(Request.HANDOVER, "camera")), Choosing())
+    assert run.method.chosen == []
+    assert run.said[-1] == "operator: paused: nobody drives"
 
 
 @pytest.mark.parametrize("request_", list(Request))
 def test_what_comes_too_late_is_not_done(request_):
-    service = Service(Script(ask(request_, "camera"), in_time=False), Choosing(), snapshot=lambda: lambda: "saved")
-    assert service.said == [f"operator: {request_} came too late: ask again"]
-    assert (service.desk.paused, service.desk.episode, service.method.chosen) == (False, 0, [])
+    run = Run(Script(ask(request_, "camera"), in_time=False), Choosing(), snapshot=lambda: lambda: "saved")
+    assert run.said == [f"operator: {request_} came too late: ask again"]
+    assert (run.service.paused, run.service.episode, run.method.chosen) == (False, 0, [])
 
 
 def wait_for(condition):
