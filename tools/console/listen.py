@@ -9,10 +9,10 @@ import cv2
 import numpy as np
 
 from lira.hal.bus.bus import Bus, Received
-from lira.hal.bus.topics import APPLIED, BATTERY, CAMERA, DECISION, ODOM, OPERATOR_ANSWER, SCAN
+from lira.hal.bus.topics import APPLIED, BATTERY, CAMERA, DECISION, ODOM, OPERATOR_ANSWER, SCAN, SIM_STATE
 from lira.hal.messages import ByteArray, CompressedImage, Reason
 from lira.hal.profile import RobotProfile
-from lira.tools.console.state import View
+from lira.tools.operator.view import View
 
 M = TypeVar("M")
 
@@ -24,7 +24,8 @@ class Ears:
         self._scan, self._camera = watch.reader(SCAN), watch.reader(CAMERA)
         self._odom, self._applied = watch.reader(ODOM), watch.reader(APPLIED)
         self._decision, self._battery = watch.reader(DECISION), watch.reader(BATTERY)
-        self._answer = watch.reader(OPERATOR_ANSWER)
+        self._answer, self._truth = watch.reader(OPERATOR_ANSWER), watch.reader(SIM_STATE)
+        self._answered, self._verdict_s = 0, -math.inf
         self._picture: ByteArray | None = None
         self._picture_s = -math.inf
         features, base = profile.features, profile.base
@@ -41,6 +42,9 @@ class Ears:
         decision, battery, answer = self._decision.newest(), self._battery.newest(), self._answer.newest()
         for received in self._camera.poll()[-1:]:
             self._picture, self._picture_s = decode_picture(received.message), received.arrived_s
+        truth = self._truth.newest()
+        if answer is not None and answer.message.count != self._answered:
+            self._answered, self._verdict_s = answer.message.count, answer.arrived_s
         now_s = time.monotonic()
         return replace(
             self._view,
@@ -49,6 +53,8 @@ class Ears:
             camera=self._picture,
             camera_age_s=now_s - self._picture_s,
             odom=_message(odom),
+            truth=_message(truth),
+            truth_age_s=_age_s(truth, now_s),
             applied=_message(applied),
             link_age_s=_age_s(applied, now_s),
             decision=_message(decision),
@@ -56,6 +62,7 @@ class Ears:
             battery=_message(battery),
             answer=_message(answer),
             answer_age_s=_age_s(answer, now_s),
+            verdict_age_s=now_s - self._verdict_s,
             estop=applied is not None and applied.message.reason is Reason.ESTOP,
         )
 

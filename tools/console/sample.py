@@ -16,7 +16,7 @@ from lira.hal.messages import (
     Twist,
 )
 from lira.hal.profile import load_profile
-from lira.tools.console.state import View
+from lira.tools.operator.view import View
 
 START_M = 14.0
 
@@ -59,6 +59,7 @@ def sample_view() -> View:
         battery=BatteryState(seen.stamp_s, 11.9),
         answer=OperatorAnswer(seen.stamp_s, count=1, words="saved 139 labels and the novice after 4 training steps"),
         answer_age_s=0.1,
+        verdict_age_s=0.1,
         fov_rad=min(profile.features.fov_rad, 2 * math.pi),
         max_range_m=profile.features.max_range_m,
     )
