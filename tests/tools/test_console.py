@@ -6,6 +6,7 @@ import sys
 import time
 from dataclasses import replace
 
+import cv2
 import numpy as np
 import pytest
 
@@ -32,10 +33,11 @@ from lira.tools.bench import null_robot
 from lira.tools.bench.takeover import policy
 from lira.tools.console import sound
 from lira.tools.console.keyboard import keyboard_mapping, pad_of
-from lira.tools.console.listen import Ears, decode_picture
+from lira.tools.console.picture import pixels_of
 from lira.tools.joystick.axes import action_of
 from lira.tools.joystick.client import TeleopClient
 from lira.tools.launch.processes import ChildProcess, free_port, lira_command
+from lira.tools.operator.listen import Ears
 from lira.tools.operator.situation import URGENCY, Situation, Urgency
 from lira.tools.operator.view import View
 from lira.tools.operator.voice import Voice, verdict, vocabulary
@@ -57,8 +59,8 @@ VIEW = View(
     "rosbot",
     scan=SCAN,
     scan_age_s=0.1,
-    camera=np.full((32, 32, 3), 200, np.uint8),
-    camera_age_s=0.1,
+    picture=CompressedImage(1.0, cv2.imencode(".png", np.full((32, 32, 3), 200, np.uint8))[1].tobytes()),
+    picture_age_s=0.1,
     applied=APPLIED_NOW,
     link_age_s=0.02,
     decision=DECISION,
@@ -154,7 +156,7 @@ def test_only_what_changed_changes_on_the_screen():
 def test_a_stale_picture_is_not_shown():
     box = pygame.Rect(16, 40, 528, 300)
     assert share_of(part(picture(VIEW), box), (200, 200, 200)) > 0.3
-    assert share_of(part(picture(replace(VIEW, camera_age_s=2.0)), box), (200, 200, 200)) == 0.0
+    assert share_of(part(picture(replace(VIEW, picture_age_s=2.0)), box), (200, 200, 200)) == 0.0
 
 
 def test_actions_of_an_old_decision_are_not_shown_and_its_counts_are():
@@ -206,7 +208,7 @@ def test_what_needs_a_person_sounds_different():
 
 
 def test_a_truncated_picture_is_none():
-    assert decode_picture(CompressedImage(0.0, b"\xff\xd8 no picture")) is None
+    assert pixels_of(CompressedImage(0.0, b"\xff\xd8 no picture")) is None
 
 
 SLOW = """

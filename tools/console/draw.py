@@ -21,6 +21,7 @@ from lira.tools.console.palette import (
     write,
     write_lines,
 )
+from lira.tools.console.picture import pixels_of
 from lira.tools.operator.situation import Urgency
 from lira.tools.operator.view import LOW_V, STALE_S, View, battery_share
 from lira.tools.operator.voice import Voice, speak, verdict
@@ -53,13 +54,14 @@ def draw(surface: pygame.Surface, view: View) -> None:
 def draw_camera(surface: pygame.Surface, box: pygame.Rect, view: View) -> None:
     """The camera's picture, as large as fits; hatched out when it is stale."""
     panel(surface, box, "camera")
-    if view.camera is None or view.camera_age_s > STALE_S:
+    pixels = None if view.picture_age_s > STALE_S else pixels_of(view.picture)
+    if pixels is None:
         write(surface, "no picture", box.center, 28, DIM, centre=True)
         return
-    height, width = view.camera.shape[:2]
+    height, width = pixels.shape[:2]
     scale = min((box.width - 16) / width, (box.height - 36) / height)
     size = (max(1, round(width * scale)), max(1, round(height * scale)))
-    picture = pygame.image.frombuffer(view.camera.tobytes(), (width, height), "RGB")
+    picture = pygame.image.frombuffer(pixels.tobytes(), (width, height), "RGB")
     picture = pygame.transform.scale(picture, size)
     surface.blit(picture, picture.get_rect(center=(box.centerx, box.centery + 10)))
 

@@ -15,6 +15,7 @@ from lira.hal.messages import (
     Source,
     Twist,
 )
+from lira.hal.messages.compression import compress_image
 from lira.hal.profile import load_profile
 from lira.tools.operator.view import View
 
@@ -35,7 +36,8 @@ def sample_view() -> View:
         seen = twin.read()
     finally:
         twin.close()
-    pixels = seen.image.data if isinstance(seen.image, Image) else None
+    assert seen.image is not None
+    picture = compress_image(seen.image) if isinstance(seen.image, Image) else seen.image
     experts = (
         ExpertView("camera", (0.86, 0.42), 0.161, True),
         ExpertView("lidar", (0.71, -0.65), 0.118, True),
@@ -49,8 +51,8 @@ def sample_view() -> View:
         robot="rosbot",
         scan=seen.scan,
         scan_age_s=0.05,
-        camera=None if pixels is None else (pixels if pixels.ndim == 3 else pixels[..., None].repeat(3, axis=2)),
-        camera_age_s=0.04,
+        picture=picture,
+        picture_age_s=0.04,
         odom=seen.odom,
         applied=Applied(twist, seen.stamp_s, Source.POLICY, Reason.OK),
         link_age_s=0.012,

@@ -6,7 +6,7 @@ from lira.hal.bus.topics import OPERATOR_ANSWER
 from lira.hal.messages import (
     Applied,
     BatteryState,
-    ByteArray,
+    CompressedImage,
     CourseState,
     Decision,
     LaserScan,
@@ -23,7 +23,7 @@ EMPTY_V, LOW_V, FULL_V = 10.2, 10.8, 12.6  # three lithium cells
 class View:
     """What is known now. A part is None until it was heard; ages are in seconds since it was.
 
-    `camera` is RGB, uint8 [height, width, 3]. `truth` is a twin's. `hand` is how the dead-man of
+    `truth` is a twin's. `hand` is how the dead-man of
     who looks is (`deadman.State`), None without one.
     `answer` is whoever's who drives and learns, repeated by them, and `verdict_age_s` how long ago it was a new one;
     `unanswered` is a request of who looks that nobody answered.
@@ -33,8 +33,8 @@ class View:
     robot: str
     scan: LaserScan | None = None
     scan_age_s: float = float("inf")
-    camera: ByteArray | None = None
-    camera_age_s: float = float("inf")
+    picture: CompressedImage | None = None
+    picture_age_s: float = float("inf")
     odom: Odometry | None = None
     truth: CourseState | None = None
     truth_age_s: float = float("inf")
