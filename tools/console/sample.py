@@ -15,7 +15,7 @@ from lira.hal.messages import (
     Source,
     Twist,
 )
-from lira.hal.messages.compression import compress_image
+from lira.hal.messages.compression import compress
 from lira.hal.profile import load_profile
 from lira.tools.operator.view import View
 
@@ -37,7 +37,7 @@ def sample_view() -> View:
     finally:
         twin.close()
     assert seen.image is not None
-    picture = compress_image(seen.image) if isinstance(seen.image, Image) else seen.image
+    picture = compress(seen.image, "png") if isinstance(seen.image, Image) else seen.image
     experts = (
         ExpertView("camera", (0.86, 0.42), 0.161, True),
         ExpertView("lidar", (0.71, -0.65), 0.118, True),
