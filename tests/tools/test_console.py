@@ -39,6 +39,7 @@ from lira.tools.joystick.client import TeleopClient
 from lira.tools.launch.processes import ChildProcess, free_port, lira_command
 from lira.tools.operator.listen import Ears
 from lira.tools.operator.situation import URGENCY, Situation, Urgency
+from lira.tools.operator.tones import TONES
 from lira.tools.operator.view import View
 from lira.tools.operator.voice import Voice, verdict, vocabulary
 
@@ -200,7 +201,7 @@ def test_the_keyboard_is_a_pad():
 
 
 def test_what_needs_a_person_sounds_different():
-    heard = {urgency: np.frombuffer(sound.samples(tones), np.int16) for urgency, tones in sound.TONES.items()}
+    heard = {urgency: np.frombuffer(sound.samples(tones), np.int16) for urgency, tones in TONES.items()}
     assert set(heard) == {Urgency.WATCH, Urgency.ASK, Urgency.NEED, Urgency.ALARM}
     assert len(heard[Urgency.ASK]) > 2 * len(heard[Urgency.WATCH])
     pitches = [np.argmax(np.abs(np.fft.rfft(s[:3000]))) * sound.RATE_HZ / 3000 for s in heard.values()]

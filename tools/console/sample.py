@@ -33,7 +33,7 @@ def sample_view() -> View:
     try:
         twin.reset(Episode(start_m=START_M))
         twin.wait(twin.now() + 0.3)
-        seen = twin.read()
+        seen, truth = twin.read(), twin.state()
     finally:
         twin.close()
     assert seen.image is not None
@@ -54,6 +54,8 @@ def sample_view() -> View:
         picture=picture,
         picture_age_s=0.04,
         odom=seen.odom,
+        truth=truth,
+        truth_age_s=0.05,
         applied=Applied(twist, seen.stamp_s, Source.POLICY, Reason.OK),
         link_age_s=0.012,
         decision=decision,

@@ -18,6 +18,7 @@ from lira.tools.joystick.client import TeleopClient
 from lira.tools.joystick.deadman import Hand, State
 from lira.tools.joystick.requests import RequestButtons
 from lira.tools.operator.situation import Urgency
+from lira.tools.operator.tones import TONES
 from lira.tools.operator.view import View
 from lira.tools.operator.voice import speak
 
@@ -142,4 +143,4 @@ def load_sounds() -> dict[Urgency, pygame.mixer.Sound]:
         pygame.mixer.init(frequency=sound.RATE_HZ, size=-16, channels=1)
     except pygame.error:
         return {}
-    return {urgency: pygame.mixer.Sound(buffer=sound.samples(tones)) for urgency, tones in sound.TONES.items()}
+    return {urgency: pygame.mixer.Sound(buffer=sound.samples(tones)) for urgency, tones in TONES.items()}

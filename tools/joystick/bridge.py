@@ -96,6 +96,11 @@ class Bridge:
         if self._pad is None:
             self._tell("no pad is there: plug one in, or press its PS button")
 
+    @property
+    def hand(self) -> State:
+        """How the dead-man is."""
+        return self._hand.state
+
     def run(self, stop: threading.Event) -> None:
         """Go on until `stop` is set; then let the robot stand if a hand was on the controls."""
         try:
