@@ -2,7 +2,7 @@
 
 A browser hides, sleeps, loses its network, or hangs, and says nothing of it. So a page that drives says what its
 controls are 25 times a second, and with it the time of the newest frame that it has seen: what was said too long ago,
-or in answer to something old, is not obeyed. Together with the time-out of the robot the wheels have zero within 0.35 s.
+or in answer to something old, is not obeyed. With the time-out of the robot the wheels have zero within 0.35 s.
 """
 
 import threading
