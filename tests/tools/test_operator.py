@@ -69,6 +69,7 @@ CASES = [
     (replace(on_course(collided=True), truth_age_s=5.0), "one_expert"),
     (held(Reason.NO_COMMAND), "no_command"),
     (held(Reason.STALE), "stale"),
+    (held(Reason.STALE, decision=None), "no_command"),
     (held(Reason.STALE, ("no_lidar",)), "device_lost"),
     (held(Reason.NEUTRAL_FIRST), "neutral_first"),
     (held(Reason.NEUTRAL_FIRST, hand=State.DRIVING), "neutral_held"),
@@ -128,7 +129,7 @@ def test_what_needs_a_person_says_what_to_do_with_a_hand():
 
 def test_words_name_the_expert_the_devices_and_who_commands():
     assert speak(VIEW).who == "EXPERT CAMERA"
-    assert "lidar" in speak(held(Reason.STALE, ("no_lidar",))).why
+    assert "lidar" in speak(held(Reason.STALE, ("no_lidar",), decision=None)).why
     assert " for 3 s" in speak(replace(VIEW, link_age_s=3.0)).why
     assert speak(replace(VIEW, applied=replace(BY_HAND, commander="anna"))).why.startswith("anna: ")
 

@@ -100,7 +100,9 @@ def situation_of(view: View) -> Situation:
         return _S.PERSON_PAUSED if view.paused else _S.PERSON_SLOW if _is_slow(view) else _S.PERSON
     if view.paused:
         return _S.PAUSED
-    return _lap_over(view) or _standing(applied, view.hand) or _driving(view.deciding)
+    return (
+        _lap_over(view) or _standing(applied, view.hand, decides=view.decision is not None) or _driving(view.deciding)
+    )
 
 
 def lost_devices(applied: Applied) -> tuple[str, ...]:
@@ -125,12 +127,14 @@ def _lap_over(view: View) -> Situation | None:
     return next((situation for over, situation in ends if over), None)
 
 
-def _standing(applied: Applied, hand: str | None) -> Situation | None:
+def _standing(applied: Applied, hand: str | None, *, decides: bool) -> Situation | None:
     """Why the governor lets nothing through, if it does not."""
     if applied.source is not Source.NONE and applied.reason is Reason.OK:
         return None
     if applied.reason is Reason.STALE and lost_devices(applied):
         return _S.DEVICE_LOST
+    if applied.reason is Reason.STALE and not decides:
+        return _S.NO_COMMAND  # a hand has let go, and there is nobody to go on
     if applied.reason is Reason.NEUTRAL_FIRST and hand == HAND_DRIVES:
         return _S.NEUTRAL_HELD
     return STANDING[applied.reason]

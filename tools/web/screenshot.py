@@ -1,4 +1,4 @@
-"""A picture of the page with a sample drive, as a browser that is installed draws it: for the README, and to look at."""
+"""A picture of the page with a sample drive, as an installed browser draws it: for the README, and to look at."""
 
 import asyncio
 import shutil
@@ -27,7 +27,7 @@ HOST = "127.0.0.1"
 
 
 def save_page(path: Path, size: tuple[int, int] = SIZE) -> None:
-    """Draw the page and write it as .png. Raises `ConfigError` without a browser, `StorageError` where it is not written."""
+    """Draw the page and write it as .png. Raises `ConfigError` without a browser, `StorageError` if nothing came."""
     browser = next(filter(None, map(shutil.which, BROWSERS)), None)
     if browser is None:
         raise ConfigError("no browser is installed to draw the page with", f"Install one of: {', '.join(BROWSERS)}.")
@@ -36,9 +36,8 @@ def save_page(path: Path, size: tuple[int, int] = SIZE) -> None:
     assert picture is not None
     info = Info(load_profile("thesis-sim"), "realtime", 0, arena=msgspec.Raw(msgspec.json.encode(world)))
     settings = lambda language: settings_of(info, view.robot, 0, language)  # noqa: E731
-    server = PageServer(
-        lambda: replace(view, picture=replace(picture)), Seat(), Access(True, own_names(HOST)), None, settings
-    )
+    access = Access(open_here=True, hosts=own_names(HOST))
+    server = PageServer(lambda: replace(view, picture=replace(picture)), Seat(), access, None, settings)
     stop, up, ports = threading.Event(), threading.Event(), list[int]()
 
     def ready(port: int) -> None:
@@ -50,11 +49,9 @@ def save_page(path: Path, size: tuple[int, int] = SIZE) -> None:
     up.wait(END_S)
     try:
         with tempfile.TemporaryDirectory() as home:
-            words = [
-                browser, "--headless", "--no-sandbox", "--disable-gpu", "--hide-scrollbars", f"--user-data-dir={home}",
-                f"--window-size={size[0]},{size[1]}", f"--virtual-time-budget={LOAD_MS}", f"--screenshot={path.resolve()}",
-                f"http://{HOST}:{ports[0]}/",
-            ]  # fmt: skip
+            flags = ["--headless", "--no-sandbox", "--disable-gpu", "--hide-scrollbars", f"--user-data-dir={home}"]
+            flags += [f"--window-size={size[0]},{size[1]}", f"--virtual-time-budget={LOAD_MS}"]
+            words = [browser, *flags, f"--screenshot={path.resolve()}", f"http://{HOST}:{ports[0]}/"]
             done = subprocess.run(words, capture_output=True, text=True, timeout=END_S, check=False)
     finally:
         stop.set()

@@ -130,7 +130,10 @@ function watch() {
   }
 }
 
-at("#drive").onclick = () => say({ type: "take", sit: document.body.dataset.seat !== "yours" });
+at("#drive").onclick = () => {
+  say({ type: "take", sit: document.body.dataset.seat !== "yours" });
+  at("#drive").blur(); // the space bar is the dead-man
+};
 at("#sound").onchange = () => sound([[880, 0.1]]); // a browser makes sound only once it was touched
 
 settings = await (await fetch(`/settings.json?language=${language}`)).json();
