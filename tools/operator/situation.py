@@ -100,9 +100,8 @@ def situation_of(view: View) -> Situation:
         return _S.PERSON_PAUSED if view.paused else _S.PERSON_SLOW if _is_slow(view) else _S.PERSON
     if view.paused:
         return _S.PAUSED
-    return (
-        _lap_over(view) or _standing(applied, view.hand, decides=view.decision is not None) or _driving(view.deciding)
-    )
+    standing = standing_of(applied, view.hand, decides=view.decision is not None)
+    return _lap_over(view) or standing or _driving(view.deciding)
 
 
 def lost_devices(applied: Applied) -> tuple[str, ...]:
@@ -127,8 +126,8 @@ def _lap_over(view: View) -> Situation | None:
     return next((situation for over, situation in ends if over), None)
 
 
-def _standing(applied: Applied, hand: str | None, *, decides: bool) -> Situation | None:
-    """Why the governor lets nothing through, if it does not."""
+def standing_of(applied: Applied, hand: str | None = None, *, decides: bool = True) -> Situation | None:
+    """Why the governor lets nothing through, None if it does. `decides`: somebody was heard who makes decisions."""
     if applied.source is not Source.NONE and applied.reason is Reason.OK:
         return None
     if applied.reason is Reason.STALE and lost_devices(applied):

@@ -8,8 +8,8 @@ from pathlib import Path
 import msgspec
 
 from lira.hal.errors import ConfigError
-from lira.hal.messages import Applied, Reason, Source
-from lira.tools.operator.situation import URGENCY, Situation, Urgency, lost_devices, situation_of
+from lira.hal.messages import Applied, Source
+from lira.tools.operator.situation import URGENCY, Situation, Urgency, lost_devices, situation_of, standing_of
 from lira.tools.operator.view import View
 
 ENGLISH = "en"
@@ -48,9 +48,9 @@ def speak(view: View, language: str = ENGLISH) -> Voice:
 
 def explain(applied: Applied) -> str:
     """Why the robot stands, and what to do, in one line for a terminal."""
-    held = replace(applied, source=Source.NONE, commander="")
-    voice = speak(View("", applied=held, link_age_s=0.0, estop=applied.reason is Reason.ESTOP))
-    return f"{voice.who}: {voice.why} {voice.now}"
+    situation = standing_of(replace(applied, source=Source.NONE)) or Situation.TOLD_TO_STAND
+    words, facts = vocabulary(ENGLISH)[situation], _facts(View("", applied=applied))
+    return f"{words.who}: {words.why.format_map(facts)} {words.now}"
 
 
 def verdict(view: View) -> tuple[str, bool | None]:

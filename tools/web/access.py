@@ -103,5 +103,8 @@ def tls_context(keys: Keys | None, host: str) -> ssl.SSLContext | None:
         )
     context = ssl.SSLContext(ssl.PROTOCOL_TLS_SERVER)
     context.minimum_version = ssl.TLSVersion.TLSv1_3
-    context.load_cert_chain(keys.folder / CERTIFICATE, keys.folder / KEY)
+    try:
+        context.load_cert_chain(keys.folder / CERTIFICATE, keys.folder / KEY)
+    except (OSError, ssl.SSLError) as error:
+        raise ConfigError(f"the keys in {keys.folder} cannot be used: {error}", "Copy the bundle again.") from error
     return context
