@@ -34,7 +34,7 @@ if TYPE_CHECKING:
     from lira.tools.launch.launch import Part
     from lira.tools.launch.processes import ChildProcess
 
-NEEDED = {"pybullet": "sim", "torch": "learn"}  # by the two processes, and the extras that bring them
+NEEDED = {"torch": "learn"}  # and the extras that bring it
 NEEDED_BY_WIRE = {"serial": "robot"}
 POLL_S = 0.1
 STALL_S = 60.0
@@ -62,6 +62,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--wire",
         action="store_true",
         help="through the robot's drivers: `lira robot` on emulated devices, in real time",
+    )
+    add(
+        "--renderer",
+        choices=("sketch", "tiny", "egl"),
+        default="sketch",
+        help="what draws and measures the world, as in `lira twin` (default: %(default)s)",
     )
     add("--run", type=Path, metavar="DIR", help="folder of the run (default: runs/demo-<date-time>)")
 
@@ -97,7 +103,7 @@ def run(args: argparse.Namespace) -> int:
     port = free_port()
     name, endpoint = f"demo_{port}", f"127.0.0.1:{port}"
     both = ["--layout", str(args.layout), "--seed", str(args.seed)]
-    twin = ["--world", world, "--profile", robot, *both]
+    twin = ["--world", world, "--profile", robot, "--renderer", args.renderer, *both]
     fusion = [*both, "--name", name, "--connect", endpoint, "--method", args.method, "--teacher", "scripted"]
     fusion += ["--run", str(folder), "--train-laps", str(args.laps), "--unseen", str(args.unseen)]
     fusion += ["--layouts", args.layouts, "--proof", args.proof]
