@@ -16,6 +16,7 @@ from lira.hal.bus.access_log import Refusals
 from lira.hal.bus.boundary import Boundary
 from lira.hal.bus.connection import Connection
 from lira.hal.bus.endpoint import DEFAULT_ROBOT, check_address, check_name, is_loopback
+from lira.hal.bus.expiry import Reminder
 from lira.hal.bus.keys import Keys, keys_from_environment, load_keys
 from lira.hal.bus.publisher import Publisher
 from lira.hal.bus.questions import Answer, Questions, ask_once
@@ -91,6 +92,7 @@ class Bus:
             else lambda: open_session(robot, listen, None, self._read_keys(), prefix=self._prefix),
             None if keys is None else self._keys_changed,
         )
+        self._reminder = None if keys is None else Reminder(keys)
         if connect and not self._connection.wait_up(WATCH_S if watch else FIRST_S) and watch:
             self.close()
             raise BusError(f"cannot open the bus at {connect}", "Check the address, and that the robot runs.")
@@ -169,6 +171,8 @@ class Bus:
 
     def close(self, timeout_s: float = CLOSE_S) -> bool:
         """Close the session; False if a dead link kept it from closing in time. May be called twice."""
+        if self._reminder is not None:
+            self._reminder.close()
         return self._connection.close(timeout_s)
 
     @property
