@@ -56,6 +56,7 @@ EXTRAS = {
     "pybullet": "sim",
     "serial": "robot",
     "openni": "robot",
+    "av": "video",
     "joblib": "experiment",
     "torch": "learn",
     "safetensors": "learn",

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from openni import openni2
+from openni import _openni2, openni2
 from openni.utils import ClosedHandle, InitializationError, OpenNIError
 
 from lira.hal.bus.topics import DEPTH
@@ -132,6 +132,8 @@ def quietly(end: Callable[[], object]) -> None:
 
 def load(folder: Path | None) -> None:
     """Load OpenNI2 from a folder, or from where OPENNI2_REDIST says. Raises `DeviceError`."""
+    if openni2.loaded_dll_directory is None:
+        _openni2._the_dll = None  # the package keeps a library that did not start, and then refuses every other
     try:
         openni2.initialize(*([] if folder is None else [str(folder)]))
     except (InitializationError, *FAULTS) as error:
