@@ -22,12 +22,16 @@ class HttpStream:
     def __init__(self, address: Address) -> None:
         self._address = address
         self._sockets: list[socket.socket] = []
+        self._answers: list[http.client.HTTPResponse] = []
         try:
             self._answer: Any = self._opener().open(address.url, timeout=ANSWER_S)
+            self._close_all_but(self._answer)
         except HTTPError as error:
             error.close()
+            self._close_all_but(None)
             raise self._refused(error.code) from error
         except FAULTS as error:
+            self._close_all_but(None)
             what = f"no camera answers at {address.shown}: {words(error)}"
             raise DeviceError(what, "Check the address and the network.") from error
 
@@ -66,6 +70,14 @@ class HttpStream:
         with contextlib.suppress(*FAULTS):
             self._answer.close()
 
+    def _close_all_but(self, last: Any) -> None:
+        """Let go of refusals and redirections that came on the way."""
+        for answer in self._answers:
+            if answer is not last:
+                answer.close()
+        for each in self._sockets if last is None else self._sockets[:-1]:
+            each.close()
+
     def _opener(self) -> urllib.request.OpenerDirector:
         """Ask the camera itself, not a proxy; the password is for this camera only, wherever it redirects to."""
         parts = urlsplit(self._address.url)
@@ -75,8 +87,8 @@ class HttpStream:
             passwords.add_password(None, everything_there, self._address.name, self._address.password)
         opener = urllib.request.OpenerDirector()
         for handler in (
-            _Http(self._sockets),
-            _Https(self._sockets),
+            _Http(self._connection_of(http.client.HTTPConnection)),
+            _Https(self._connection_of(http.client.HTTPSConnection)),
             urllib.request.HTTPRedirectHandler(),
             urllib.request.HTTPDigestAuthHandler(passwords),
             urllib.request.HTTPBasicAuthHandler(passwords),
@@ -85,6 +97,22 @@ class HttpStream:
         ):
             opener.add_handler(handler)
         return opener
+
+    def _connection_of(self, kind: type[http.client.HTTPConnection]) -> Any:
+        """Make a kind of connection that notes its sockets and answers: the library gives away neither."""
+        sockets, answers = self._sockets, self._answers
+
+        class Noting(kind):  # type: ignore[misc, valid-type]
+            def connect(self) -> None:
+                super().connect()
+                sockets.append(self.sock)
+
+            def getresponse(self) -> http.client.HTTPResponse:
+                answer: http.client.HTTPResponse = super().getresponse()
+                answers.append(answer)
+                return answer
+
+        return Noting
 
     def _refused(self, status: int) -> DeviceError:
         if status in UNAUTHORISED:
@@ -102,30 +130,19 @@ def words(error: Exception) -> str:
     return error.strerror or str(error) if isinstance(error, OSError) else type(error).__name__
 
 
-def _noting(kind: type[http.client.HTTPConnection], sockets: list[socket.socket]) -> Any:
-    """Make connections of a kind that note their sockets."""
-
-    class Noting(kind):  # type: ignore[misc, valid-type]
-        def connect(self) -> None:
-            super().connect()
-            sockets.append(self.sock)
-
-    return Noting
-
-
 class _Http(urllib.request.HTTPHandler):
-    def __init__(self, sockets: list[socket.socket]) -> None:
+    def __init__(self, connection: Any) -> None:
         super().__init__()
-        self._connection = _noting(http.client.HTTPConnection, sockets)
+        self._connection = connection
 
     def http_open(self, request: urllib.request.Request) -> http.client.HTTPResponse:
         return self.do_open(self._connection, request)
 
 
 class _Https(urllib.request.HTTPSHandler):
-    def __init__(self, sockets: list[socket.socket]) -> None:
+    def __init__(self, connection: Any) -> None:
         super().__init__()
-        self._connection = _noting(http.client.HTTPSConnection, sockets)
+        self._connection = connection
 
     def https_open(self, request: urllib.request.Request) -> http.client.HTTPResponse:
         return self.do_open(self._connection, request)

@@ -1,3 +1,6 @@
+import shutil
+import subprocess
+import sys
 import time
 
 import numpy as np
@@ -25,7 +28,7 @@ def test_openni_takes_pictures_and_can_be_opened_again(openni):
             watch.wait(5)
         first, *_, last = watch.pictures
         assert isinstance(first, Image)
-        assert first.data.shape == (240, 320, 3)
+        assert first.data.shape == (480, 640, 3)  # the profile's
         assert first.data.dtype == np.uint8
         assert not np.array_equal(first.data, last.data)  # its ball moves
         periods_s = np.diff([picture.stamp_s for picture in watch.pictures])
@@ -41,7 +44,7 @@ def test_openni_gives_depth_beside_the_pictures_and_it_can_be_opened_again(openn
         assert depth.data.shape == (240, 320)
         assert depth.data.dtype == np.uint16
         assert 0 < depth.data.max() <= 10_000  # millimetres
-        assert watch.pictures[-1].data.shape == (240, 320, 3)
+        assert watch.pictures[-1].data.shape == (480, 640, 3)
 
 
 def test_a_camera_that_is_lost_is_opened_again_with_its_depth(openni, monkeypatch):
@@ -70,3 +73,25 @@ def test_without_the_library_openni_says_where_it_belongs(tmp_path, monkeypatch)
     with pytest.raises(DeviceError, match="does not load") as refused:
         open_source("openni:", (640, 480), tmp_path)
     assert "--openni" in refused.value.remedy
+
+
+def test_openni_loads_from_the_right_folder_after_it_failed_in_a_wrong_one(openni, tmp_path):
+    """In a process of its own: the library can only be loaded once."""
+    broken = tmp_path / "broken"
+    broken.mkdir()
+    shutil.copy(openni / "libOpenNI2.so", broken)  # without its drivers it loads and does not start
+    code = f"""
+from pathlib import Path
+from lira.hal.errors import DeviceError
+from lira.robot.camera.astra import load
+for folder in (Path({str(broken)!r}), Path({str(tmp_path / "nothing")!r}), Path({str(broken)!r})):
+    try:
+        load(folder)
+    except DeviceError as error:
+        assert "already loaded" not in str(error), error
+    else:
+        raise SystemExit("it loaded without drivers")
+load(Path({str(openni)!r}))
+"""
+    done = subprocess.run([sys.executable, "-c", code], check=False, capture_output=True, text=True, timeout=60)
+    assert done.returncode == 0, done.stdout + done.stderr
