@@ -132,13 +132,19 @@ def quietly(end: Callable[[], object]) -> None:
 
 def load(folder: Path | None) -> None:
     """Load OpenNI2 from a folder, or from where OPENNI2_REDIST says. Raises `DeviceError`."""
-    if openni2.loaded_dll_directory is None:
-        _openni2._the_dll = None  # the package keeps a library that did not start, and then refuses every other
     try:
         openni2.initialize(*([] if folder is None else [str(folder)]))
     except (InitializationError, *FAULTS) as error:
+        forget_failed_load()
         why = (str(error).splitlines() or [type(error).__name__])[-1].strip()
         raise DeviceError(f"OpenNI2 does not load: {why}", INSTALL) from error
+
+
+def forget_failed_load() -> None:
+    """The package keeps a library that did not start and refuses every other; the library believes that it did."""
+    if openni2.loaded_dll_directory is None and _openni2._the_dll is not None:
+        quietly(_openni2.oniShutdown)
+        _openni2._the_dll = None
 
 
 def colour_modes(modes: Any) -> list[Any]:
