@@ -60,7 +60,6 @@ EXTRAS = {
     "joblib": "experiment",
     "torch": "learn",
     "safetensors": "learn",
-    "evdev": "joystick",
     "pygame": "console",
     "cryptography": "keys",
 }
