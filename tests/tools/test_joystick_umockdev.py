@@ -359,9 +359,9 @@ def test_a_hat_asks_for_experts_and_the_layout_is_that_of_the_pad(bed, start):
     rig = start()
     rig.says("layout DualShock 4, DualSense")
     rig.says("ready: hold the dead-man")
+    rig.begin()  # before it has heard the robot it asks nothing
     bed.axis(PAD, "ABS_HAT0X", 1)
     wait_for(lambda: rig.asked.last() == OperatorRequest(Request.HANDOVER, "expert 2"), rig.process.output)
-    rig.begin()
 
 
 def test_a_pad_that_comes_back_by_cable_under_another_name_is_the_same(bed, start):
