@@ -75,7 +75,7 @@ class LapRecord(msgspec.Struct, frozen=True, tag="lap"):
 
     `human_labels` (stored), `interventions`, `calls` and `buffer` are totals of the session so far; `passed` means: to
     the end, no collision, line never lost. `unassisted` means that no human action was needed. `stops` counts how often
-    a novice that drove alone stood and asked, being in doubt.
+    a novice that drove alone stood and asked, being in doubt; `shielded` in how many steps a shield changed its turn.
     """
 
     phase: str
@@ -94,6 +94,7 @@ class LapRecord(msgspec.Struct, frozen=True, tag="lap"):
     training_steps: int
     elapsed_s: float
     stops: int = 0
+    shielded: int = 0
 
 
 class RunRecord(msgspec.Struct, frozen=True, tag="run"):

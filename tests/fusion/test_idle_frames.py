@@ -6,8 +6,8 @@ from nets import camera_net
 
 from lira.fusion.learning.novice import LearningSettings, NetworkNovice
 from lira.fusion.methods.base import Expert
-from lira.fusion.methods.hg_dagger import HgDagger
 from lira.fusion.methods.lira import PRESETS, LiraSpf
+from lira.fusion.methods.rivals.hg_dagger import HgDagger
 from lira.fusion.preprocess import Features
 
 FEATURES = Features(scan=np.zeros(101, np.float32), image=np.zeros((32, 32), np.float32))

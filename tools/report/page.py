@@ -139,7 +139,7 @@ def drivers(run: Run) -> list[tuple[str, str]]:
     """Who drove in this run: words for the legend and the style's name."""
     seen = {step.decision.driver for _, step in run.steps()}
     known = [("novice", "novice"), ("human", "human"), *((name, f"{name} expert") for name in run.experts)]
-    known.append(("mean", "mean of the experts"))
+    known += [("mean", "mean of the experts"), ("shield", "the shield, instead of the novice")]
     return [(words, plots.driver_class(name, run.experts)) for name, words in known if name in seen]
 
 

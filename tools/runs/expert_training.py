@@ -16,7 +16,7 @@ from lira.fusion.learning.novice import LearningSettings, NetworkNovice
 from lira.fusion.learning.trainer import InlineTrainer
 from lira.fusion.log.recorder import Journal
 from lira.fusion.methods.base import Alone
-from lira.fusion.methods.hg_dagger import HgDagger
+from lira.fusion.methods.rivals.hg_dagger import HgDagger
 from lira.fusion.policies.checkpoint import Checkpoint, save_checkpoint
 from lira.fusion.policies.networks import ExpertNet, Network
 from lira.fusion.preprocess import modalities_of

@@ -58,6 +58,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add("--laps", type=natural, default=12, help="give up after so many training laps (default: %(default)s)")
     add("--unseen", type=natural, default=3, help="unseen layouts to drive afterwards (default: %(default)s)")
     add_protocol(parser, layouts="fresh", proof="fresh:3")
+    add("--shield", action="store_true", help="drive the unseen layouts behind a shield, as in `lira fusion`")
     add(
         "--wire",
         action="store_true",
@@ -101,6 +102,7 @@ def run(args: argparse.Namespace) -> int:
     fusion = [*both, "--name", name, "--connect", endpoint, "--method", args.method, "--teacher", "scripted"]
     fusion += ["--run", str(folder), "--train-laps", str(args.laps), "--unseen", str(args.unseen)]
     fusion += ["--layouts", args.layouts, "--proof", args.proof]
+    fusion += ["--shield"] if args.shield else []
     fusion += [word for expert in args.expert for word in ("--expert", expert)]
     fusion += ["--as-command", shlex.join(["lira", *sys.argv[1:]])]
     if args.wire:
