@@ -80,6 +80,8 @@ CASES = [
     (decided(driver="human", call="feedback", **NEW), "waits"),
     (decided(driver="human", call="feedback"), "unknown"),
     (decided(driver="novice", call="feedback"), "disagree"),
+    (decided(driver="shield", call="none"), "shield"),
+    (decided(driver="shield", call="feedback"), "shield_stands"),
     (decided(driver="novice", call="none"), "novice"),
     (decided(driver="novice", call="none", phase="prove"), "proving"),
     (decided(driver="novice", call="none", phase="unseen"), "proving"),

@@ -4,20 +4,45 @@ import contextlib
 import os
 import shutil
 import sys
+import threading
 import time
 
 import pytest
 
 from lira.hal.bus.bus import Bus
 from lira.hal.bus.topics import APPLIED
-from lira.hal.messages import Source
+from lira.hal.client.remote import RemoteRobot
+from lira.hal.messages import STOP, Command, Source, Twist
 from lira.tools.bench import null_robot
-from lira.tools.bench.takeover import policy
 from lira.tools.launch.processes import ChildProcess, free_port, lira_command
 
 NEEDED = ("chromium", "chromedriver")
 missing = [name for name in NEEDED if shutil.which(name) is None]
 needs_browser = pytest.mark.skipif(bool(missing), reason=f"needs {' and '.join(missing)} (Debian)")
+
+
+@contextlib.contextmanager
+def policy(name, endpoint):
+    """Drives on and on, and never asks a robot that has stopped to move again: that is for a person."""
+    stop, bus = threading.Event(), Bus(name, connect=endpoint)
+    robot = RemoteRobot(bus)
+    robot.open()
+
+    def drive():
+        robot.drive(Command(STOP, robot.now(), answers=robot.read().seq))
+        while not stop.is_set():
+            robot.drive(Command(Twist(0.3, 0.0), robot.now(), answers=robot.read().seq))
+            robot.wait(robot.now() + robot.profile.period_s)
+
+    thread = threading.Thread(target=drive)
+    thread.start()
+    try:
+        yield
+    finally:
+        stop.set()
+        thread.join()
+        robot.close()
+        bus.close()
 
 
 @contextlib.contextmanager

@@ -5,7 +5,8 @@ import time
 from dataclasses import replace
 from typing import TypeVar
 
-from lira.hal.bus.bus import Bus, Received
+from lira.hal.bus.bus import Bus
+from lira.hal.bus.reader import Received
 from lira.hal.bus.topics import APPLIED, BATTERY, CAMERA, DECISION, ODOM, OPERATOR_ANSWER, SCAN, SIM_STATE
 from lira.hal.messages import Reason
 from lira.hal.profile import RobotProfile

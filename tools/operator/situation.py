@@ -49,6 +49,8 @@ class Situation(StrEnum):
     UNKNOWN = "unknown"
     DISAGREE = "disagree"
     ONE_EXPERT = "one_expert"
+    SHIELD = "shield"
+    SHIELD_STANDS = "shield_stands"
     PROVING = "proving"
     NOVICE = "novice"
     MEAN = "mean"
@@ -72,9 +74,9 @@ URGENCY: dict[Situation, Urgency] = {
     **dict.fromkeys(Situation, Urgency.CALM),
     **dict.fromkeys((_S.ESTOP, _S.ESTOP_CONFIRMED, _S.NO_LINK), Urgency.ALARM),
     **dict.fromkeys((_S.STALE, _S.NEUTRAL_FIRST, _S.NEUTRAL_HELD, _S.REFUSED, _S.DEVICE_LOST), Urgency.NEED),
-    **dict.fromkeys((_S.COLLIDED, _S.STRAYED, _S.WAITS, _S.OBSTACLE, _S.UNKNOWN), Urgency.NEED),
+    **dict.fromkeys((_S.COLLIDED, _S.STRAYED, _S.WAITS, _S.OBSTACLE, _S.UNKNOWN, _S.SHIELD_STANDS), Urgency.NEED),
     **dict.fromkeys((_S.DISAGREE,), Urgency.ASK),
-    **dict.fromkeys((_S.ONE_EXPERT,), Urgency.WATCH),
+    **dict.fromkeys((_S.ONE_EXPERT, _S.SHIELD), Urgency.WATCH),
     **dict.fromkeys((_S.PAUSED, _S.FINISHED, _S.NO_COMMAND, _S.TOLD_TO_STAND), Urgency.IDLE),
 }
 
@@ -143,6 +145,8 @@ def _driving(decision: Decision | None) -> Situation:
     """Which policy drives, and why it is that one."""
     if decision is None:
         return _S.POLICY
+    if decision.driver == "shield":
+        return _S.SHIELD_STANDS if decision.call == "feedback" else _S.SHIELD
     if decision.call == "feedback":
         if decision.driver in ("nobody", "human"):
             return _S.WAITS if decision.training_steps == 0 and not decision.labels.demonstration else _S.UNKNOWN

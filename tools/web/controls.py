@@ -10,16 +10,18 @@ from lira.tools.web.pad import PageFinder
 from lira.tools.web.seat import Seat, page_mapping
 
 JOIN_S = 2.0
+ADVICE = "nobody has the controls: press Drive on the page"
 
 
 class Controls:
     """Drives one robot from whatever page has the seat, until closed: then the robot stands."""
 
     def __init__(self, client: TeleopClient, seat: Seat, say: Callable[[str], None] = print) -> None:
-        mapping = page_mapping()
         self._client = client
-        self._finder = PageFinder(seat, mapping)
-        self._bridge = Bridge(mapping, client, self._finder, PadMemory(None), say)
+        self._finder = PageFinder(seat, page_mapping())
+        self._bridge = Bridge(
+            client, self._finder, PadMemory(None), say, lambda: "nobody has the controls: press Drive on the page"
+        )
         self._stop = threading.Event()
         self._thread = threading.Thread(target=self._bridge.run, args=(self._stop,), name="controls", daemon=True)
         self._thread.start()

@@ -14,11 +14,12 @@ class PagePad:
     """Implements `tools.joystick.bridge.OpenPad` for whoever has the seat. `wake` is called when a page has spoken."""
 
     name, key = "a page in a browser", "page"
-    has_motion = False
+    has_motion, motion_trouble = False, ""
 
     def __init__(self, seat: Seat, mapping: Mapping, client: Client) -> None:
         self.state = PadState()
-        self._seat, self._mapping, self._client = seat, mapping, client
+        self.mapping = mapping
+        self._seat, self._client = seat, client
         self._near, self._far = socket.socketpair()
         self._near.setblocking(False)
         self._far.setblocking(False)
@@ -38,7 +39,7 @@ class PagePad:
             self._near.recv(4096)
         if self._seat.holder() != self._client:
             raise DeviceError("the page has left its seat", "Press Drive on a page.")
-        states = [pad_of(said, self._mapping) for said in self._seat.take_said()]
+        states = [pad_of(said, self.mapping) for said in self._seat.take_said()]
         if states:
             self.state = states[-1]
         if not self._seat.alive(time.monotonic()):
