@@ -101,7 +101,7 @@ def test_two_thumbs_drive_and_one_lifted_lets_go(page, applied):
     touch(page, "touchStart", points(page, "deadman"))
     touch(page, "touchStart", points(page, "deadman", "stick"))
     wait_until(applied.by_hand, what="thumbs do not drive")
-    touch(page, "touchEnd", [points(page, "deadman", "stick")[1]])
+    touch(page, "touchMove", [points(page, "deadman", "stick")[1]])  # whatever is left out is lifted
     wait_until(lambda: applied.listen()[-1].source is Source.POLICY, what="control did not go back to the policy")
     touch(page, "touchEnd", [])
 
@@ -172,6 +172,10 @@ def test_however_the_page_is_lost_the_robot_stands_and_no_policy_takes_over(robo
     assert applied.zero_after_s() <= LONGEST_S
     stood = next(index for index, each in reversed(list(enumerate(applied.all))) if each.source is Source.TELEOP)
     assert not any(each.twist.linear_m_s for each in applied.all[stood + 1 :]), "somebody else drove on"
+    for other in chromium.window_handles[1:]:
+        chromium.switch_to.window(other)
+        chromium.close()
+    chromium.switch_to.window(chromium.window_handles[0])
     chromium.get("about:blank")
 
 

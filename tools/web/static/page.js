@@ -66,7 +66,7 @@ function tell(urgency, who, why, now) {
   loud = urgency;
   document.body.dataset.urgency = urgency;
   at("#sign polygon").setAttribute("points", corners(CORNERS[urgency] || 0));
-  if (navigator.vibrate && settings.shakes[urgency]) navigator.vibrate(settings.shakes[urgency]);
+  if (navigator.userActivation?.hasBeenActive && navigator.vibrate && settings.shakes[urgency]) navigator.vibrate(settings.shakes[urgency]);
   if (settings.tones[urgency]) sound(settings.tones[urgency]);
 }
 
