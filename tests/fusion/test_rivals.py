@@ -194,7 +194,7 @@ def test_thrifty_daggers_thresholds_follow_from_its_budget():
 
 def test_a_probe_says_nothing_until_it_has_seen_enough_and_then_tells_rare_places_apart():
     probe = Probe(seed=0)
-    near = Features(scan=np.full(101, 0.1, np.float32), image=FEATURES.image)
+    near = Features(**{**FEATURES, "scan": np.full(101, 0.1, np.float32)})
     for _ in range(START - 1):
         probe.add(FEATURES, NOVICE, 0.0)
     probe.fit()
