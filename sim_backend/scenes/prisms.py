@@ -1,4 +1,4 @@
-"""The boxes of a layout as arrays: what of them faces an eye, which is in front of which, and what rays meet."""
+"""The boxes of a layout as arrays: which is in front of which, and where rays meet them."""
 
 import math
 from collections.abc import Iterable
@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from lira.sim_backend.layout import Block
 from lira.sim_backend.polyline import Floats
-from lira.sim_backend.scenes.meshes import BOX_FACES, Indices, box_mesh
+from lira.sim_backend.scenes.meshes import Indices, box_mesh
 
 Flags = NDArray[np.bool_]
 
@@ -23,23 +23,13 @@ class Prisms:
         rows = [(b.x_m, b.y_m, b.yaw_rad, b.length_m, b.width_m, b.bottom_m, b.height_m, b.gray) for b in blocks]
         x, y, yaw, length, width, bottom, height, gray = np.array(rows, dtype=np.float64).reshape(-1, 8).T
         self.gray: Indices = gray.astype(np.intp)
-        self.corners: Floats = np.array([box_mesh(block)[0] for block in blocks]).reshape(-1, 8, 3)
-        # Indices of the corners of all boxes, one box after the other.
-        self.faces: Indices = BOX_FACES + 8 * np.arange(len(blocks))[:, None, None]
-        self._x, self._y, self._cos, self._sin = x, y, np.cos(yaw), np.sin(yaw)
-        self._half_length, self._half_width = length / 2, width / 2
-        self._size_m = np.hypot(length, width) / 2
+        self._corners: Floats = np.array([box_mesh(block)[0] for block in blocks]).reshape(-1, 8, 3)
+        self._x, self._y, self._yaw = x, y, yaw
+        self._cos, self._sin = np.cos(yaw), np.sin(yaw)
+        self._low = np.stack([-length / 2, -width / 2, bottom], axis=1)
+        self._high = np.stack([length / 2, width / 2, bottom + height], axis=1)
         self._bottom, self._top = bottom, bottom + height
-
-    def facing(self, eye: Floats) -> Flags:
-        """Which faces an eye at [3] looks at from outside, [boxes, 6] as in `BOX_FACES`."""
-        along, across = self._to_own(eye[0], eye[1])
-        beyond = (
-            *(along < -self._half_length, along > self._half_length),
-            *(across < -self._half_width, across > self._half_width),
-            *(eye[2] < self._bottom, eye[2] > self._top),
-        )
-        return np.stack(beyond, axis=1)
+        self._size_m = np.hypot(length, width) / 2
 
     def far_to_near(self, chosen: Indices, facing: Flags, eye: Floats) -> Iterable[Indices]:
         """Sort boxes into an order to paint them in: groups of one gray, each over those before it.
@@ -66,51 +56,48 @@ class Prisms:
     @cached_property
     def _beyond(self) -> Flags:
         """Which boxes lie beyond which faces of which, [i, face, j]: all of j is on the outer side of i's face."""
-        x, y, z = self.corners.transpose(2, 0, 1)
-        count = len(self.gray)
-        flags: Flags = np.empty((count, 6, count), dtype=np.bool_)
-        for i in range(count):
-            off_x, off_y = x - self._x[i], y - self._y[i]
-            along, across = (
-                self._cos[i] * off_x + self._sin[i] * off_y,
-                self._cos[i] * off_y - self._sin[i] * off_x,
-            )
-            places = ((along, self._half_length[i]), (across, self._half_width[i]))
-            for axis, (place, half) in enumerate(places):
-                flags[i, 2 * axis] = (place <= TOUCHING_M - half).all(1)
-                flags[i, 2 * axis + 1] = (place >= half - TOUCHING_M).all(1)
-            flags[i, 4] = (z <= self._bottom[i] + TOUCHING_M).all(1)
-            flags[i, 5] = (z >= self._top[i] - TOUCHING_M).all(1)
+        everyone = np.arange(len(self.gray))
+        flags: Flags = np.empty((len(everyone), 6, len(everyone)), dtype=np.bool_)
+        for j, corners in enumerate(self._corners):
+            own = np.stack([self._to_own(corner, everyone) for corner in corners])  # [corners, boxes, axes]
+            flags[:, 0::2, j] = np.all(own <= self._low + TOUCHING_M, axis=0)
+            flags[:, 1::2, j] = np.all(own >= self._high - TOUCHING_M, axis=0)
         return flags
 
     def ranges_m(self, origin: tuple[float, float, float], angles_rad: Floats, reach_m: float) -> Floats:
         """Distances to the first box along level rays [n] from one point; infinite beyond `reach_m`."""
-        x, y, z = origin
-        met = np.hypot(self._x - x, self._y - y) - self._size_m <= reach_m
-        met &= (self._bottom <= z) & (z <= self._top)
-        directions = np.stack([np.cos(angles_rad), np.sin(angles_rad), np.zeros(len(angles_rad))])
-        free = self.distances_m(np.array(origin), directions, np.flatnonzero(met))
+        off_x, off_y = self._x - origin[0], self._y - origin[1]
+        met = (off_x * off_x + off_y * off_y <= (reach_m + self._size_m) ** 2) & (self._bottom <= origin[2])
+        chosen = np.flatnonzero(met & (origin[2] <= self._top))
+        if not len(chosen):
+            return np.full(len(angles_rad), math.inf)
+        own = angles_rad - self._yaw[chosen, None]
+        free = self._enter(np.array(origin), np.stack([np.cos(own), np.sin(own)], axis=1), chosen).min(axis=0)
         return np.where(free <= reach_m, free, math.inf)
 
     def distances_m(self, eye: Floats, directions: Floats, chosen: Indices) -> Floats:
         """How many times each of the directions [3, n] it is from a point to the first of some boxes: [n]."""
         nearest = np.full(directions.shape[1], math.inf)
-        along, across = self._to_own(eye[0], eye[1])
-        with np.errstate(divide="ignore", invalid="ignore"):
-            for i in chosen.tolist():
-                cos, sin = self._cos[i], self._sin[i]
-                enter, leave = 0.0, math.inf
-                for at, way, low, high in (
-                    (along[i], cos * directions[0] + sin * directions[1], -self._half_length[i], self._half_length[i]),
-                    (across[i], cos * directions[1] - sin * directions[0], -self._half_width[i], self._half_width[i]),
-                    (eye[2], directions[2], self._bottom[i], self._top[i]),
-                ):
-                    one, other = (low - at) / way, (high - at) / way
-                    enter, leave = np.fmax(enter, np.fmin(one, other)), np.fmin(leave, np.fmax(one, other))
-                nearest = np.where(enter <= leave, np.minimum(nearest, enter), nearest)
+        for i in chosen:  # one by one: there are many rays
+            cos, sin = self._cos[i], self._sin[i]
+            turn = np.array([[cos, sin, 0.0], [-sin, cos, 0.0], [0.0, 0.0, 1.0]])
+            nearest = np.minimum(nearest, self._enter(eye, (turn @ directions)[None], np.array([i]))[0])
         return nearest
 
-    def _to_own(self, x: float, y: float) -> tuple[Floats, Floats]:
-        """A place along and across each box, from its middle: [boxes] each."""
-        off_x, off_y = x - self._x, y - self._y
-        return self._cos * off_x + self._sin * off_y, self._cos * off_y - self._sin * off_x
+    def _enter(self, origin: Floats, own: Floats, chosen: Indices) -> Floats:
+        """How far along rays some boxes are entered, [boxes, n]; infinite where a ray misses one.
+
+        `own` [boxes, axes, n] are the directions along, across and, unless all are level, up each box.
+        """
+        low, high = self._low[chosen, : own.shape[1], None], self._high[chosen, : own.shape[1], None]
+        at = self._to_own(origin, chosen)[:, : own.shape[1], None]
+        with np.errstate(divide="ignore", invalid="ignore"):  # between two faces that it is parallel to, or not
+            one, other = (low - at) / own, (high - at) / own
+        enter = np.maximum(np.fmax.reduce(np.fmin(one, other), axis=1), 0.0)
+        return np.where(enter <= np.fmin.reduce(np.fmax(one, other), axis=1), enter, math.inf)
+
+    def _to_own(self, place: Floats, chosen: Indices) -> Floats:
+        """A place [3] along, across and above some boxes, from the middle of where they stand: [boxes, 3]."""
+        off_x, off_y = place[0] - self._x[chosen], place[1] - self._y[chosen]
+        cos, sin = self._cos[chosen], self._sin[chosen]
+        return np.stack([cos * off_x + sin * off_y, cos * off_y - sin * off_x, np.full(len(chosen), place[2])], axis=1)
