@@ -6,7 +6,7 @@ from numpy.typing import NDArray
 from lira.sim_backend.layout import Layout
 from lira.sim_backend.polyline import Floats
 from lira.sim_backend.scenes.base import FAR_M, NEAR_M, Pose, View
-from lira.sim_backend.scenes.meshes import Indices, box_mesh, paint
+from lira.sim_backend.scenes.meshes import Indices, box_mesh, paint, straighten
 
 Flags = NDArray[np.bool_]
 
@@ -18,17 +18,18 @@ class Facets:
     """
 
     def __init__(self, layout: Layout) -> None:
-        layers = [(gray, points[faces]) for gray, (points, faces) in paint(layout)]
+        layers = [(gray, straighten(points[faces])) for gray, (points, faces) in paint(layout)]
         boxes = [(block.gray, points[faces]) for block in layout.blocks for points, faces in [box_mesh(block)]]
         pieces = [corners for _, corners in layers + boxes]
         self.corners: Floats = np.concatenate([np.zeros((0, 4, 3)), *pieces])
         self.gray: Indices = np.repeat([gray for gray, _ in layers + boxes], [len(each) for each in pieces]).astype(int)
         self.painted = sum(len(corners) for _, corners in layers)
-        self._centre: Floats = self.corners.mean(axis=1)
-        self._radius_m: Floats = np.sqrt(((self.corners - self._centre[:, None]) ** 2).sum(-1).max(-1, initial=0.0))
+        centre = self.corners.mean(axis=1)
+        self._centre: Floats = np.ascontiguousarray(centre.T)
+        self._radius_m: Floats = np.sqrt(((self.corners - centre[:, None]) ** 2).sum(-1).max(-1, initial=0.0))
         outward = np.cross(self.corners[:, 1] - self.corners[:, 0], self.corners[:, 2] - self.corners[:, 0])
         self._outward: Floats = outward
-        self._offset: Floats = (outward * self._centre).sum(-1)
+        self._offset: Floats = (outward * centre).sum(-1)
 
     def facing(self, eye: Floats) -> Flags:
         """Which of them an eye at [3] sees from outside, [n]."""
@@ -36,39 +37,38 @@ class Facets:
 
     def in_view(self, view: View, pose: Pose, eye: Floats) -> Flags:
         """Which of them may have a part in a view, [n]: never too few, at times a few too many."""
-        wide, high = view.tangents
-        right, up, ahead = view.axes(pose).T
-        outward = np.stack([right - wide * ahead, -right - wide * ahead, up - high * ahead, -up - high * ahead], axis=1)
-        outward /= np.sqrt((outward**2).sum(0))
-        planes = np.concatenate([outward, -ahead[:, None], ahead[:, None]], axis=1)
-        beyond_m = self._centre @ planes - (eye @ planes + (0.0, 0.0, 0.0, 0.0, -NEAR_M, FAR_M))
-        inside: Flags = np.all(beyond_m <= self._radius_m[:, None], axis=1)
+        bounds = (view.axes(pose) @ view.bounds).T
+        reach_m = bounds @ eye + (0.0, 0.0, 0.0, 0.0, -NEAR_M, FAR_M)
+        inside: Flags = np.all(bounds @ self._centre <= self._radius_m + reach_m[:, None], axis=0)
         return inside
 
 
-def project(corners: Floats, view: View, pose: Pose, eye: Floats) -> tuple[Floats, Floats]:
-    """Where in the picture the corners of faces [n, 4, 3] are: x and y [n, 4], in pixels from its upper left corner.
+def project(corners: Floats, view: View, pose: Pose, eye: Floats) -> Floats:
+    """Where in the picture the corners of faces [n, 4, 3] are: x and y [2, m, 4], in pixels from its upper left corner.
 
-    Of faces that come too near the eye the part that does is cut off: then there are five corners of each.
+    Of faces that come too near the eye the part that does is cut off, which leaves none, one or two of them.
     """
+    own = ((corners.reshape(-1, 3) - eye) @ view.axes(pose)).reshape(corners.shape)
+    if own[..., 2].min() < NEAR_M:
+        near = np.any(own[..., 2] < NEAR_M, axis=1)
+        pieces = [piece for face in own[near].tolist() for piece in cut(face)]
+        own = np.concatenate([own[~near], np.array(pieces).reshape(-1, 4, 3)])
+    right, up, ahead = own.transpose(2, 0, 1)
     wide, high = view.tangents
-    own = (corners - eye) @ view.axes(pose)
-    near = np.any(own[..., 2] < NEAR_M, axis=1)
-    if near.any():
-        cut = [clip(each) for each in own[near] if each[:, 2].max() > NEAR_M]
-        own = np.concatenate([own[~near][:, [0, 1, 2, 3, 3]], np.array(cut).reshape(-1, 5, 3)])
-    ahead = own[..., 2]
-    x: Floats = view.width_px / 2 * (1.0 + own[..., 0] / (wide * ahead))
-    y: Floats = view.height_px / 2 * (1.0 - own[..., 1] / (high * ahead))
-    return x, y
+    x = view.width_px / 2 * (1.0 + right / (wide * ahead))
+    return np.stack([x, view.height_px / 2 * (1.0 - up / (high * ahead))])
 
 
-def clip(corners: Floats) -> Floats:
-    """Cut a face [4, 3] off where it is too near: [5, 3], the last corner repeated if there are fewer."""
-    pieces = []
-    for one, other in zip(corners, corners[[1, 2, 3, 0]], strict=True):
+def cut(face: list[list[float]]) -> list[list[list[float]]]:
+    """Cut a face off where it is too near, and make faces of four corners of what is left."""
+    left = []
+    for one, other in zip(face, face[1:] + face[:1], strict=True):
         if one[2] >= NEAR_M:
-            pieces.append(one)
+            left.append(one)
         if (one[2] >= NEAR_M) != (other[2] >= NEAR_M):
-            pieces.append(one + (NEAR_M - one[2]) / (other[2] - one[2]) * (other - one))
-    return np.array(pieces + [pieces[-1]] * (5 - len(pieces)))
+            share = (NEAR_M - one[2]) / (other[2] - one[2])
+            left.append([here + share * (there - here) for here, there in zip(one, other, strict=True)])
+    if len(left) < 3:
+        return []
+    rest = [[left[0], left[3], left[4], left[4]]] if len(left) == 5 else []
+    return [[*left[:3], left[3] if len(left) > 3 else left[2]], *rest]

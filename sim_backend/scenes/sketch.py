@@ -32,15 +32,14 @@ class SketchScene:
 
     def photograph(self, view: View, pose: Pose) -> ByteArray:
         """Draw the picture: uint8 [height, width]."""
-        picture = backdrop(view, *self._backdrop).copy()
+        picture = backdrop(view, *self._backdrop)
         facets, eye = self._facets, view.eye(pose)
         facing = facets.facing(eye)
         seen = np.flatnonzero(facing & facets.in_view(view, pose, eye))
         for group in self._far_to_near(seen, facing, eye):
             if not len(group):
                 continue
-            x, y = project(facets.corners[group], view, pose, eye)
-            cover(picture, x, y, int(facets.gray[group[0]]))
+            cover(picture, project(facets.corners[group], view, pose, eye), int(facets.gray[group[0]]))
         return picture
 
     def _far_to_near(self, seen: Indices, facing: Flags, eye: Floats) -> Iterable[Indices]:
