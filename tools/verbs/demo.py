@@ -75,7 +75,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Run the demo from start to report."""
-    from lira.fusion.experts.files import SHIPPED, expert_path
+    from lira.fusion.experts.files import expert_path, experts_of
     from lira.fusion.experts.tasks import TASKS, task_of
     from lira.fusion.methods.syllabus import THESIS, with_proof
     from lira.hal.profile import load_profile
@@ -88,7 +88,7 @@ def run(args: argparse.Namespace) -> int:
     task = task_of(load_world(world).name)
     robot = args.profile or TASKS[task].profile
     profile = load_profile(robot)
-    for expert in SHIPPED:
+    for expert in experts_of(profile):
         expert_path(expert, profile, task)
     for package, extra in {**NEEDED, **(NEEDED_BY_WIRE if args.wire else {})}.items():
         if find_spec(package) is None:
@@ -190,7 +190,7 @@ def raise_dead(parts: Sequence["ChildProcess"]) -> None:
 
 def conclude(folder: Path) -> int:
     """Print the table, write the report, and return 0 if the novice was proven and passed every unseen layout."""
-    from lira.tools.output.proven import proof_words, unseen_words
+    from lira.tools.output.proven import contradiction_words, proof_words, unseen_words
     from lira.tools.output.table import format_table
     from lira.tools.report import RECORD, write_report
     from lira.tools.report.digest import load_run
@@ -200,8 +200,10 @@ def conclude(folder: Path) -> int:
     print(f"\n{format_table(COLUMNS, [lap_cells(lap) for lap in run.laps])}\n")
     unseen = [lap.record for lap in run.phase("unseen") if lap.record is not None]
     proven = run.result is not None and run.result.converged
-    for words in (unseen_words(unseen), "" if run.result is None else proof_words(run.result)):
-        if words:
-            print(words)
+    said = [unseen_words(unseen)]
+    if run.result is not None:
+        said += [proof_words(run.result), contradiction_words(run.result.contradictions)]
+    for words in filter(None, said):
+        print(words)
     print(f"report: {write_report(folder)}")
     return 0 if proven and all(lap.passed for lap in unseen) else 1
