@@ -15,10 +15,10 @@ from lira.tools.experiments.experiment import Finding, Picture
 from lira.tools.experiments.measures import driving_row, effort_row, label_row, source_rows
 from lira.tools.experiments.page import write_page
 from lira.tools.experiments.registry import REGISTRY, load
+from lira.tools.experiments.selection import chosen_methods
 from lira.tools.experiments.studies import compare, densities, faults, sharing, thresholds, trajectories
 from lira.tools.experiments.summary import read_summary, summarise, to_json
 from lira.tools.experiments.trial import Trial
-from lira.tools.verbs.experiment import chosen_methods
 
 
 def test_labels_of_a_group_in_the_columns_of_table_2():

@@ -14,7 +14,7 @@ MOST_BYTES = 2**24
 
 class Summary(msgspec.Struct, frozen=True, omit_defaults=True):
     """An experiment's numbers. `results` are the rows of its first table, `ratios` empty where nothing is paired.
-    `quality` is there where an experiment tells how good the novices are on layouts they have not seen.
+    `quality` and `curves` are there where an experiment tells how good the novices are on layouts they have not seen.
 
     `fingerprints` says with which code and experts the trials were played: one for each pair of experts.
     """
@@ -31,6 +31,7 @@ class Summary(msgspec.Struct, frozen=True, omit_defaults=True):
     tables: list[Table]
     findings: list[Finding]
     quality: list[Row] = []
+    curves: list[Row] = []
 
 
 def summarise(name: str, words: str, command: str, seeds: int, experiment: Experiment, outcomes: Outcomes) -> Summary:
@@ -49,6 +50,7 @@ def summarise(name: str, words: str, command: str, seeds: int, experiment: Exper
         tables=tables,
         findings=experiment.findings(outcomes),
         quality=experiment.quality(outcomes),
+        curves=experiment.curves(outcomes),
     )
 
 
