@@ -10,11 +10,12 @@ from lira.fusion.teaching.teacher import UNSKILLED
 from lira.hal.errors import ConfigError
 from lira.tools.experiments import equal_quality
 from lira.tools.experiments.equal_quality import curve, reached, tail
+from lira.tools.experiments.output import document, lead
+from lira.tools.experiments.output.summary import read_summary, summarise, to_json
 from lira.tools.experiments.quality import Judged, Point
 from lira.tools.experiments.registry import REGISTRY, load
 from lira.tools.experiments.selection import Selection, chosen_methods, own_trials
 from lira.tools.experiments.studies import unseen
-from lira.tools.experiments.summary import read_summary, summarise, to_json
 
 LEVELS = (0.9, 0.97)
 
@@ -188,3 +189,34 @@ def test_a_method_of_ones_own_is_taught_on_the_layouts_of_plus_and_shown_last(mo
     ]
     assert [row["method"] for row in unseen.quality([*mine, *outcomes()])] == ["plus", "hg-dagger", "lab:Mine"]
     assert {row["against"] for row in unseen.ratios([*mine, *outcomes()])} == {"hg-dagger", "lab:Mine"}
+
+
+def summaries(names):
+    """Those of `unseen` with these methods, and of the same under a shift."""
+    played = [run(name, seed, [(20, 6), (40, 12)]) for name in names for seed in range(3)]
+    main = summarise("unseen", "words", "lira experiment unseen", 3, load("unseen"), played)
+    parts = summarise("ablation", "words", "lira experiment ablation", 3, load("ablation"), played[:6])
+    elsewhere = summarise("unseen-gray", "words", "lira experiment unseen", 3, load("unseen"), played[:12])
+    return [main, elsewhere, parts]
+
+
+def test_results_lead_with_effort_and_quality_side_by_side(tmp_path):
+    found = [summarise("unseen", "words", "lira experiment unseen --seeds 4", 4, load("unseen"), outcomes())]
+    text = document.documents(found, {})["RESULTS.md"]
+    assert "| plus | 4 | 0 | 23, 60, 60 | 5.5, 15, 15 |" in text
+    assert "| hg-dagger | 4 | 1 | 69, 180, 180 |" in text
+    assert "| 48 of 48 [93, 100] % |" in text
+    assert "| 3 [3, 3] |" in text
+    assert "| plus | 48 of 48, 0 |" in text
+    lead.draw(found, tmp_path)
+    assert (tmp_path / lead.PICTURE).read_bytes().startswith(b"<?xml")
+    assert f"]({lead.PICTURE})" in text
+
+
+def test_results_stay_short_with_every_method_and_say_when_nothing_was_played():
+    thesis = [msgspec.structs.replace(summaries(["plus"])[0], name=name) for name in REGISTRY if name != "unseen"]
+    texts = document.documents([*summaries(unseen.NAMES), *thesis], {})
+    assert texts["RESULTS.md"].count("\n") <= 150
+    assert "[gray](docs/results/unseen.md#unseen-gray)" in texts["RESULTS.md"]
+    assert "What each part of plus is worth" in texts["RESULTS.md"]
+    assert "has not been played yet" in document.documents(thesis, {})["RESULTS.md"]

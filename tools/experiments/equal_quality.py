@@ -83,6 +83,11 @@ def quality_rows(groups: Groups, level: float) -> list[Row]:
     ]
 
 
+def effort_rows(groups: Groups, level: float) -> list[Row]:
+    """One row per method, all pairs of experts together."""
+    return [{"method": name, "quality": level} | effort_row(group, level) for name, group in groups.items()]
+
+
 def _of(group: Outcomes, pair: str) -> list[Outcome]:
     return [each for each in group if each.trial.pair == pair]
 

@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from pathlib import Path
 
 from msgspec.structs import replace
 
@@ -64,6 +65,17 @@ class Selection:
         words += [f"--shift {self.shift}"] if self.shift is not None else []
         words += [f"--more {self.more}"] if self.more else []
         return " ".join(words)
+
+    @property
+    def elsewhere(self) -> str:
+        """What to add to an experiment's name where it is not what it is by itself."""
+        parts = (
+            self.world and Path(self.world).stem,
+            self.teacher,
+            self.shift,
+            f"more{self.more}" if self.more else None,
+        )
+        return "".join(f"-{part}" for part in parts if part)
 
     def _elsewhere(self, trial: Trial, name: str) -> Trial:
         if (self.world, self.teacher, self.shift, self.more) == (None, None, None, 0):

@@ -5,7 +5,7 @@ folder: run the same command again to go on, or with more seeds to add to it. A 
 than today's is played again. A run that did not converge within its laps is counted as censored, with the labels it had
 used by then. The folder also gets a page (NAME.html) and the drawings.
 
-'all' does every experiment, keeps their summaries and writes RESULTS.md; 'results' writes RESULTS.md alone.
+'all' does every experiment, keeps their summaries and writes RESULTS.md and docs/results; 'results' writes these alone.
 
 examples:
   lira experiment unseen --seeds 10 --workers 2
@@ -27,7 +27,7 @@ from lira.tools.experiments.registry import REGISTRY, load, words_of
 from lira.tools.options import natural
 
 if TYPE_CHECKING:
-    from lira.tools.experiments.summary import Summary
+    from lira.tools.experiments.output.summary import Summary
 
 FOLDER = Path("runs") / "experiments"
 ALL, RESULTS = "all", "results"
@@ -72,12 +72,17 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add("--run", type=Path, default=FOLDER, metavar="DIR", help="keeps the trials and pages (default: %(default)s)")
     add("--json", metavar="FILE", help="write a JSON object to FILE (-: standard output)")
     add("--summaries", type=Path, metavar="DIR", help="summaries of all experiments (default: those of the project)")
-    add("--out", type=Path, metavar="FILE", help="where all and results write (default: the project's RESULTS.md)")
+    add(
+        "--out",
+        type=Path,
+        metavar="FILE",
+        help="where all and results write, with docs/results beside it (default: the project's RESULTS.md)",
+    )
 
 
 def run(args: argparse.Namespace) -> int:
     """Run the trials that are missing and print the tables."""
-    from lira.tools.experiments.summary import to_json
+    from lira.tools.experiments.output.summary import to_json
     from lira.tools.verbs.bench import take_stdout, write_file
 
     if args.seeds < 1 or args.workers < 1:
@@ -98,11 +103,11 @@ def run(args: argparse.Namespace) -> int:
 def play(args: argparse.Namespace, name: str) -> "tuple[Summary, Path]":
     """Run one experiment; return its summary and its page."""
     from lira.fusion.methods.presets import file_name
-    from lira.tools.experiments.page import write_page
+    from lira.tools.experiments.output.page import write_page
+    from lira.tools.experiments.output.summary import summarise
     from lira.tools.experiments.pools import Cluster, Here
     from lira.tools.experiments.runner import run_trials
     from lira.tools.experiments.selection import Selection
-    from lira.tools.experiments.summary import summarise
     from lira.tools.runs.expert_training import provide
 
     experiment = load(name)
@@ -124,7 +129,9 @@ def play(args: argparse.Namespace, name: str) -> "tuple[Summary, Path]":
         provide(pair)
     outcomes = run_trials(trials, args.run, pool)
     command = f"lira experiment {name} {selection.command}"
-    summary = summarise(file_name(name), words_of(name, experiment), command, args.seeds, experiment, outcomes)
+    summary = summarise(
+        file_name(name) + selection.elsewhere, words_of(name, experiment), command, args.seeds, experiment, outcomes
+    )
     return summary, write_page(args.run, summary, experiment.figures(outcomes))
 
 
@@ -145,9 +152,9 @@ def show(summary: "Summary", page: Path) -> None:
 
 
 def write_results(args: argparse.Namespace) -> int:
-    """Play everything first if asked to; then write RESULTS.md from the summaries that are there."""
-    from lira.tools.experiments import document
-    from lira.tools.experiments.summary import read_summaries, write_summary
+    """Play everything first if asked to; then write the documents from the summaries that are there."""
+    from lira.tools.experiments.output import document, lead
+    from lira.tools.experiments.output.summary import read_summaries, write_summary
 
     if args.methods is not None or args.method:
         raise ConfigError(f"{args.name} takes no --methods", "It is about all of them.")
@@ -161,6 +168,7 @@ def write_results(args: argparse.Namespace) -> int:
     if not summaries:
         raise ConfigError(f"{folder} holds no summary", "Make them with: lira experiment all")
     out = args.out or document.DOCUMENT
-    document.write_document(out, document.document(summaries, document.read_causes()))
-    print(f"results: {out}")
+    document.write_documents(out, document.documents(summaries, document.read_causes(), out.name))
+    lead.draw(summaries, out.parent)
+    print(f"results: {out}, and {document.PAGES} beside it")
     return 0

@@ -17,6 +17,7 @@ from lira.tools.experiments import equal_quality
 from lira.tools.experiments.equal_quality import (
     curve_rows,
     curve_table,
+    effort_rows,
     more_rows,
     quality_rows,
     ratio_rows,
@@ -81,12 +82,18 @@ def curves(outcomes: Outcomes) -> list[Row]:
     return curve_rows(by_name(outcomes))
 
 
+def pairs_of(outcomes: Outcomes) -> set[str]:
+    """Whose experts took part."""
+    return {each.trial.pair for each in outcomes}
+
+
 def tables(outcomes: Outcomes) -> list[Table]:
     """Effort and quality, ratios, curves, ways of deployment."""
     groups = by_name(outcomes)
     cut = "Who did not get there counts as censored, with what it had used. Unseen: 12 other layouts a run."
     found = [
-        *(Table(f"Effort to {level:.0%} of fresh layouts", quality_rows(groups, level), cut) for level in TO.levels),
+        *(Table(f"Effort to {level:.0%} of fresh layouts", effort_rows(groups, level), cut) for level in TO.levels),
+        Table("The same by pairs of experts", quality(outcomes) if len(pairs_of(outcomes)) > 1 else []),
         Table("Over plus, by pairs of one seed", ratios(outcomes), "A censored pair's true ratio may lie higher."),
         *(
             Table(f"Fresh layouts passed, in percent, at so many {quantity.replace('_', ' ')}", rows)
@@ -101,7 +108,7 @@ def tables(outcomes: Outcomes) -> list[Table]:
 
 def figures(outcomes: Outcomes) -> list[Picture]:
     """The curves."""
-    from lira.tools.experiments import plots
+    from lira.tools.experiments.output import plots
 
     rows = curves(outcomes)
     return [

@@ -75,5 +75,9 @@ def read_summary(path: Path) -> Summary:
 
 
 def read_summaries(folder: Path, names: Sequence[str]) -> list[Summary]:
-    """Read those of the named experiments that the folder has, in the order of the names."""
-    return [read_summary(path) for path in (folder / f"{name}.json" for name in names) if path.exists()]
+    """Read those of the named experiments that the folder has, in the order of the names.
+
+    After each come those of the same experiment elsewhere: NAME-WHERE.json.
+    """
+    paths = [path for name in names for path in (folder / f"{name}.json", *sorted(folder.glob(f"{name}-*.json")))]
+    return [read_summary(path) for path in paths if path.exists()]
