@@ -165,6 +165,7 @@ class Session:
             elapsed_s=self._journal.elapsed_s,
             account=ledger.account,
             proof=proof,
+            contradictions=() if self._apprentice is None else self._journal.contradictions(self._apprentice.novice),
         )
 
     @property

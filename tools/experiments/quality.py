@@ -21,7 +21,7 @@ from lira.fusion.methods.doubt import Doubtful
 from lira.fusion.methods.shield import Shield, Shielded
 from lira.fusion.teaching.session import Session
 from lira.hal.profile import Field, RobotProfile, load_profile
-from lira.sim_backend.foresight import sketching
+from lira.sim_backend.foresight import with_small_camera
 from lira.sim_backend.world import World
 from lira.tools.experiments.shifts import shifted
 from lira.tools.runs.build import lap
@@ -162,7 +162,7 @@ def judging(
     hand: Hand,
 ) -> Judge:
     """Return what tries a novice on these layouts, in each way, in the world as it is shifted."""
-    place, body = shifted(quality.shift, world, sketching(profile))
+    place, body = shifted(quality.shift, world, with_small_camera(profile))
 
     def judge(level: float | None) -> list[Judged]:
         ways = [way for way in quality.ways if way != "ask" or isinstance(method.novice, KernelNovice)]
@@ -187,7 +187,7 @@ def _try(
     asks = way == "ask" or method.calls_alone
     tape = Tape()
     with (
-        simulate(world, profile, layout=layouts[0], renderer="tiny") as robot,
+        simulate(world, profile, layout=layouts[0], renderer="sketch") as robot,
         hand(profile, world) if asks else nullcontext() as answering,
     ):
         loop = ControlLoop(robot, truth=robot.arena.state)
