@@ -138,9 +138,9 @@ class Session:
                 return False
         return True
 
-    def score(self, course: Course, lap: int) -> list[LapRecord]:
-        """Every proving run that belongs to a lap, whatever becomes of the others."""
-        return [self._alone(drives, "prove", lap) for drives in course.proven(lap)]
+    def score(self, runs: Sequence[Sequence[Drive]], lap: int) -> list[LapRecord]:
+        """Proving runs after a lap, whatever becomes of the others."""
+        return [self._alone(drives, "prove", lap) for drives in runs]
 
     def show(self, drives: Sequence[Drive], teacher: Teacher | None = None) -> list[LapRecord]:
         """Let the frozen novice drive, each drive a lap of its own; after a crash it goes on behind it.

@@ -26,14 +26,18 @@ def point(number, labels, passed, *, collisions=0, demonstration=0):
     )
 
 
-def judged(level, passed, *, way="plain", collisions=0):
-    return Judged(level, way, 12, passed, collisions, 12 - passed - collisions, 0, 600.0)
+def judged(levels, passed, *, way="plain", collisions=0):
+    return Judged(tuple(levels), way, 12, passed, collisions, 12 - passed - collisions, 0, 600.0)
 
 
 def run(method, seed, points, *, experts=None, more=()):
     """A trial with these points of (labels, passed); who reached a level passed as many layouts afterwards."""
     curve = tuple(point(k, labels, passed) for k, (labels, passed) in enumerate(points, start=1))
-    tried = [judged(level, each.passed) for level in LEVELS for each in curve if each.reaches(level)][:1]
+    tried = [
+        judged(new, each.passed)
+        for k, each in enumerate(curve)
+        if (new := [level for level in LEVELS if each.reaches(level) and not any(p.reaches(level) for p in curve[:k])])
+    ]
     made = outcome(method, seed, labels=points[-1][0], world=unseen.WORLD)
     trial = msgspec.structs.replace(made.trial, experts=experts)
     return msgspec.structs.replace(made, trial=trial, points=curve, judged=(*tried, *more))
@@ -119,13 +123,13 @@ def test_a_curve_says_how_good_novices_were_on_whom_at_most_so_much_was_spent():
 
 def test_the_ways_of_deployment_stand_side_by_side():
     plain = run("plus", 0, [(20, 11)])
-    shielded = msgspec.structs.replace(plain, judged=(*plain.judged, judged(0.9, 12, way="shield")))
+    shielded = msgspec.structs.replace(plain, judged=(*plain.judged, judged([0.9], 12, way="shield")))
     rows = equal_quality.way_rows({"plus": [shielded]}, 0.9)
     assert [(row["deployed"], row["unseen_passed"]) for row in rows] == [("plain", 11), ("shield", 12)]
 
 
 def test_what_more_teaching_does_is_held_against_what_was_proven():
-    taught_on = run("plus", 0, [(20, 12)], more=[judged(0.97, 12), judged(None, 9)])
+    taught_on = run("plus", 0, [(20, 12)], more=[judged([], 9)])
     rows = equal_quality.more_rows({"plus": [taught_on]})
     assert [(row["when"], row["unseen_passed"]) for row in rows] == [("proven", 12), ("taught on", 9)]
     assert equal_quality.more_rows({"plus": [run("plus", 0, [(20, 12)])]}) == []
@@ -149,7 +153,15 @@ def test_a_proof_of_ones_own_stays_with_what_a_method_is():
 
 def test_where_by_whom_and_with_whose_experts_can_be_chosen():
     asked = Selection(
-        2, 300, "plus", pairs=("line@1", "line@2"), world="race", teacher="unskilled", shift="gray", more=5
+        2,
+        300,
+        "plus",
+        pairs=("line@1", "line@2"),
+        world="race",
+        teacher="unskilled",
+        shift="gray",
+        more=5,
+        ways=("plain", "ask"),
     )
     trials = asked.trials(load("unseen"), "unseen")
     assert len(trials) == 4
@@ -161,7 +173,7 @@ def test_where_by_whom_and_with_whose_experts_can_be_chosen():
     }
     assert asked.command == (
         "--seeds 2 --methods plus --first-seed 300 --experts line@1,line@2 --world race --teacher unskilled "
-        "--shift gray --more 5"
+        "--shift gray --more 5 --ways plain,ask"
     )
     assert len({each.file for each in trials}) == 4
 
@@ -169,6 +181,8 @@ def test_where_by_whom_and_with_whose_experts_can_be_chosen():
 def test_what_an_experiment_does_not_know_is_refused():
     with pytest.raises(ConfigError, match="takes no --world"):
         Selection(1, world="race").trials(load("table2"), "table2")
+    with pytest.raises(ConfigError, match="no way of deployment 'rope'"):
+        Selection(1, ways=("rope",)).trials(load("unseen"), "unseen")  # type: ignore[arg-type]
     with pytest.raises(ConfigError, match="no shift 'snow'"):
         Selection(1, shift="snow").trials(load("unseen"), "unseen")
 

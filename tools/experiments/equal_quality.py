@@ -31,13 +31,19 @@ class Reached(Point, frozen=True, kw_only=True):
 
 def reached(outcome: Outcome, level: float) -> Reached:
     """The first point that is good enough, else the last one."""
-    good = next((point for point in outcome.points if point.reaches(level)), None)
+    good = next((point for point in outcome.points if point.reaches(level, layouts(outcome))), None)
     return Reached(**msgspec.structs.asdict(good or outcome.points[-1]), converged=good is not None)
 
 
+def layouts(outcome: Outcome) -> int:
+    """How many layouts make a point."""
+    return outcome.trial.quality.layouts if outcome.trial.quality is not None else 12
+
+
 def tried(outcomes: Outcomes, level: float | None, way: str) -> list[Judged]:
-    """How those that had reached a level drove in one way."""
-    return [each for outcome in outcomes for each in outcome.judged if (each.level, each.way) == (level, way)]
+    """How those that had just reached a level (None: that were taught on) drove in one way."""
+    judged = [each for outcome in outcomes for each in outcome.judged if each.way == way]
+    return [each for each in judged if (level in each.levels if level is not None else not each.levels)]
 
 
 def effort_row(group: Outcomes, level: float) -> Row:
@@ -114,7 +120,7 @@ def more_rows(groups: Groups) -> list[Row]:
     """Whether more laps of teaching spoil it: at the highest level, and after the laps that followed."""
     rows: list[Row] = []
     for name, group in groups.items():
-        level = max((each.level for o in group for each in o.judged if each.level is not None), default=None)
+        level = max((level for o in group for each in o.judged for level in each.levels), default=None)
         for words, judged in (("proven", tried(group, level, "plain")), ("taught on", tried(group, None, "plain"))):
             if level is not None and tried(group, None, "plain"):
                 rows.append({"method": name, "when": words} | driving_row(judged, "unseen"))

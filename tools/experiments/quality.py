@@ -39,6 +39,7 @@ class Quality(msgspec.Struct, frozen=True):
     """What is asked of a novice: to pass these shares of `layouts` fresh ones after one lap, lowest first.
 
     `ways` are those in which who reaches a level is tried, under `shift`. After the highest level `more` laps follow.
+    A novice that can reach no level any more after half of the layouts is not driven on the others.
     """
 
     layouts: int = 12
@@ -46,6 +47,11 @@ class Quality(msgspec.Struct, frozen=True):
     ways: tuple[Way, ...] = ("plain",)
     shift: str | None = None
     more: int = 0
+
+
+def least(level: float, layouts: int) -> int:
+    """How many of so many layouts a level asks for."""
+    return math.ceil(level * layouts - 1e-9)
 
 
 class Point(msgspec.Struct, frozen=True):
@@ -62,15 +68,15 @@ class Point(msgspec.Struct, frozen=True):
     collisions: int = 0
     driven_m: float = 0.0
 
-    def reaches(self, level: float) -> bool:
-        """Whether so large a share was passed."""
-        return self.layouts > 0 and self.passed >= math.ceil(level * self.layouts - 1e-9)
+    def reaches(self, level: float, layouts: int = 12) -> bool:
+        """Whether so large a share of so many layouts was passed."""
+        return self.passed >= least(level, layouts)
 
 
 class Judged(msgspec.Struct, frozen=True):
-    """How a novice that had reached `level` (None: after the laps that followed) drove layouts that decide nothing."""
+    """How a novice drove layouts that decide nothing, when it had just reached `levels`; none: after the last laps."""
 
-    level: float | None
+    levels: tuple[float, ...]
     way: Way
     layouts: int
     passed: int
@@ -97,7 +103,7 @@ class Tape:
             self._last = None
 
 
-Judge = Callable[[float | None], Sequence[Judged]]
+Judge = Callable[[tuple[float, ...]], Sequence[Judged]]
 Hand = Callable[[RobotProfile, World], AbstractContextManager[Teacher]]
 """Opens somebody who answers."""
 
@@ -121,10 +127,11 @@ def teach_to(
     waiting, more = list(quality.levels), quality.more
     for number in range(1, course.laps + quality.more + 1):
         session.train(course, hand, number)
-        points.append(_point(session, method, journal, tape, course, number))
-        for level in [each for each in waiting if points[-1].reaches(each)]:
-            waiting.remove(level)
-            judged += judge(level)
+        points.append(_point(quality, session, method, journal, tape, course, number))
+        new = tuple(level for level in waiting if points[-1].reaches(level, quality.layouts))
+        if new:
+            waiting = [level for level in waiting if level not in new]
+            judged += judge(new)
         if number >= course.laps and waiting:
             break
         if not waiting:
@@ -132,13 +139,21 @@ def teach_to(
                 break
             more -= 1
     if quality.more:
-        judged += judge(None)
+        judged += judge(())
     return session.result(not waiting, course.syllabus.proof), points, judged
 
 
-def _point(session: Session, method: Method, journal: Journal, tape: Tape, course: Course, number: int) -> Point:
+def _point(
+    quality: Quality, session: Session, method: Method, journal: Journal, tape: Tape, course: Course, number: int
+) -> Point:
     ledger, before_m = journal.ledger, tape.driven_m
-    shown = session.score(course, number) if method.novice.trained else []
+    shown: list[LapRecord] = []
+    if method.novice.trained:
+        runs = course.proven(number)
+        half = len(runs) // 2
+        shown = session.score(runs[:half], number)
+        if sum(each.passed for each in shown) + len(runs) - half >= least(quality.levels[0], len(runs)):
+            shown += session.score(runs[half:], number)
     return Point(
         lap=number,
         human_labels=ledger.labels.stored_human,
@@ -164,15 +179,15 @@ def judging(
     """Return what tries a novice on these layouts, in each way, in the world as it is shifted."""
     place, body = shifted(quality.shift, world, with_small_camera(profile))
 
-    def judge(level: float | None) -> list[Judged]:
+    def judge(levels: tuple[float, ...]) -> list[Judged]:
         ways = [way for way in quality.ways if way != "ask" or isinstance(method.novice, KernelNovice)]
-        return [_try(level, way, method, body, place, layouts, hand) for way in ways]
+        return [_try(levels, way, method, body, place, layouts, hand) for way in ways]
 
     return judge
 
 
 def _try(
-    level: float | None,
+    levels: tuple[float, ...],
     way: Way,
     method: Method,
     profile: RobotProfile,
@@ -195,7 +210,7 @@ def _try(
         loop.arm()
         laps = session.show([lap(profile, world, layout) for layout in layouts], answering)
     return Judged(
-        level,
+        levels,
         way,
         layouts=len(laps),
         passed=sum(each.passed for each in laps),

@@ -10,6 +10,7 @@ from lira.fusion.methods.presets import method_named
 from lira.fusion.teaching.teacher import TEACHERS
 from lira.hal.errors import ConfigError
 from lira.tools.experiments.experiment import Experiment
+from lira.tools.experiments.quality import WAYS, Way
 from lira.tools.experiments.shifts import SHIFTS
 from lira.tools.experiments.trial import Trial
 
@@ -20,8 +21,8 @@ ALL = "all"
 class Selection:
     """What is asked for. `methods` is a list with commas, "all", or None for the usual ones; `own` are a user's own.
 
-    `pairs` of experts replace the world's; `world`, `teacher`, `shift` and `more` laps go with experiments at equal
-    quality.
+    `pairs` of experts replace the world's; `world`, `teacher`, `shift`, `more` laps and `ways` of deployment go with
+    experiments at equal quality.
     """
 
     seeds: int
@@ -33,6 +34,7 @@ class Selection:
     teacher: str | None = None
     shift: str | None = None
     more: int = 0
+    ways: Sequence[Way] = ()
     all_experiments: bool = field(default=False, kw_only=True)
 
     def trials(self, experiment: Experiment, name: str) -> list[Trial]:
@@ -64,6 +66,7 @@ class Selection:
         words += [f"--teacher {self.teacher}"] if self.teacher is not None else []
         words += [f"--shift {self.shift}"] if self.shift is not None else []
         words += [f"--more {self.more}"] if self.more else []
+        words += [f"--ways {','.join(self.ways)}"] if self.ways else []
         return " ".join(words)
 
     @property
@@ -78,16 +81,19 @@ class Selection:
         return "".join(f"-{part}" for part in parts if part)
 
     def _elsewhere(self, trial: Trial, name: str) -> Trial:
-        if (self.world, self.teacher, self.shift, self.more) == (None, None, None, 0):
+        if (self.world, self.teacher, self.shift, self.more, self.ways) == (None, None, None, 0, ()):
             return trial
         if trial.quality is None:
-            what = f"{name} takes no --world, --teacher, --shift or --more"
+            what = f"{name} takes no --world, --teacher, --shift, --more or --ways"
             raise ConfigError(what, "They go with 'unseen' and other experiments at equal quality.")
         teacher = self.teacher or trial.teacher
         if teacher not in TEACHERS or (self.shift is not None and self.shift not in SHIFTS):
             what = f"no teacher '{teacher}' or no shift '{self.shift}'"
             raise ConfigError(what, f"Teachers: {', '.join(TEACHERS)}; shifts: {', '.join(SHIFTS)}.")
-        quality = replace(trial.quality, shift=self.shift, more=self.more)
+        ways = tuple(self.ways) or trial.quality.ways
+        if not set(ways) <= set(WAYS):
+            raise ConfigError(f"no way of deployment '{min(set(ways) - set(WAYS))}'", f"Ways: {', '.join(WAYS)}.")
+        quality = replace(trial.quality, shift=self.shift, more=self.more, ways=ways)
         return replace(
             trial, world=self.world or trial.world, teacher=teacher, skill=TEACHERS[teacher], quality=quality
         )

@@ -66,6 +66,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="of unseen: what is other where the novice is tried than where it was taught: gray, boxes, curvature, "
         "noise, camera or slip",
     )
+    add("--ways", help="of unseen: how novices are tried: plain, field, shield, ask (default: plain,shield)")
     add("--more", type=natural, default=0, help="of unseen: teach on for so many laps, to see whether that spoils it")
     add("--workers", type=int, default=1, help="processes side by side (default: %(default)s)")
     add("--scheduler", metavar="ADDRESS", help="run on this Dask cluster instead, like tcp://192.168.1.5:8786")
@@ -122,6 +123,7 @@ def play(args: argparse.Namespace, name: str) -> "tuple[Summary, Path]":
         teacher=args.teacher,
         shift=args.shift,
         more=args.more,
+        ways=tuple(args.ways.split(",")) if args.ways else (),
         all_experiments=args.name == ALL,
     )
     trials = selection.trials(experiment, name)

@@ -25,12 +25,12 @@ from lira.tools.experiments.equal_quality import (
 )
 from lira.tools.experiments.experiment import Experiment, Outcomes, Picture, Row, Table
 from lira.tools.experiments.measures import by_method
-from lira.tools.experiments.quality import WAYS, Quality
+from lira.tools.experiments.quality import Quality
 from lira.tools.experiments.trial import Outcome, Trial
 
 WORLD = "line-obstacles"
-LAPS = 8
-TO = Quality(ways=WAYS)
+LAPS = 6
+TO = Quality(ways=("plain", "shield"))
 BASE = "plus"
 USUAL = (BASE, "hold", "hg-dagger", "hg-dagger-kernel")
 NAMES = (
