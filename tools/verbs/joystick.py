@@ -18,6 +18,7 @@ from pathlib import Path
 
 from lira.hal.errors import DeviceError
 from lira.tools.launch.lifetime import CLOSE_S, stop_or_interrupt
+from lira.tools.options import add_client
 
 ANSWER_S = 10.0
 
@@ -25,8 +26,7 @@ ANSWER_S = 10.0
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
     add = parser.add_argument
-    add("--name", default="rosbot", help="the robot's name on the bus (default: %(default)s)")
-    add("--connect", default="127.0.0.1:7447", metavar="HOST:PORT", help="where the robot is (default: %(default)s)")
+    add_client(parser)
     add("--pad", default="ps3", metavar="NAME|FILE", help="kind of pad by name or .toml file (default: %(default)s)")
     add("--device", metavar="PATH", help="the pad's /dev/input/event* or a link to it (default: the first that fits)")
     add("--learn", type=Path, metavar="FILE", help="ask for each control and write a new pad's file, then end")

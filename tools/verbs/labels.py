@@ -16,6 +16,8 @@ import json
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from lira.tools.options import add_json
+
 if TYPE_CHECKING:
     from lira.fusion.log.label_salvage import Survey
 
@@ -27,14 +29,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add("file", type=Path, metavar="FILE", help="the log")
     add("--repair", action="store_true", help="put a clean file in its place, and keep the damaged one beside it")
     add("--profile", help="whose labels they are, if the file does not say (default: the known robots)")
-    add("--json", metavar="FILE", help="write a JSON object to FILE (-: standard output)")
+    add_json(parser)
 
 
 def run(args: argparse.Namespace) -> int:
     """Check, repair if asked to, and say what was found."""
     from lira.fusion.log.label_log import check_log, repair_log
     from lira.hal.profile import known_profiles, load_profile
-    from lira.tools.verbs.bench import write_file
+    from lira.tools.output.machine import write_file
 
     robots = [load_profile(name) for name in ([args.profile] if args.profile else known_profiles())]
     kept: Path | None = None
