@@ -73,7 +73,7 @@ def hand(place):
         bus.close()
 
 
-def assert_ends(learner, signal.SIGTERM):
+def assert_ends(learner, number):
     began_s = time.monotonic()
     learner.signal(number)
     assert learner.wait(20.0) == 0, learner.output()
