@@ -6,7 +6,8 @@ import msgspec
 import numpy as np
 import pytest
 
-from lira.fusion.preprocess import bin_scan, gray_image, to_uint8
+from lira.fusion.modalities.image import gray_image, to_uint8
+from lira.fusion.modalities.scan import bin_scan
 from lira.hal.messages import Command, Twist
 from lira.hal.profile import load_profile
 from lira.sim_backend import drive
@@ -25,15 +26,15 @@ QUIET_ROSBOT = msgspec.structs.replace(
 )
 
 
-@pytest.fixture
-def look():
+@pytest.fixture(params=["sketch", "tiny"])
+def look(request):
     """What the networks see at a pose of a world: gray levels uint8 [32, 32] and normalised ranges [bins]."""
     opened = {}
 
     def look(world, pose, profile=SIM, layout=0):
         key = (msgspec.json.encode(world), layout, profile.name)
         if key not in opened:
-            opened[key] = Sensors(profile, build(world, layout), "tiny", 0)
+            opened[key] = Sensors(profile, build(world, layout), request.param, 0)
         sensors = opened[key]
         sensors.forget()
         motion = drive.motion(*pose)

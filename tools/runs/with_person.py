@@ -27,7 +27,9 @@ from lira.tools.runs.teach import Plan, Publish, Say
 
 def show_policy(args: argparse.Namespace, robot: RemoteRobot, publish: Publish, say: Say) -> int:
     """Let one policy drive until Ctrl-C."""
-    method = load_alone(args.policy, robot.profile, args.experts or task_of(world_of(robot)), ask=args.ask)
+    method = load_alone(
+        args.policy, robot.profile, args.experts or task_of(world_of(robot)), ask=args.ask, shield=args.shield
+    )
     journal, loop = Journal(publish=publish), ControlLoop(robot)
     with stop_or_interrupt() as stop, request_line(robot, args) as line:
         service = OperatorService(line, loop, method, journal, say, restart=restarter(robot, args))
@@ -55,7 +57,7 @@ def learn_from_person(
             record.write(head)
             for old in read_demonstrations(log.path):
                 if old.stored:
-                    novice.remember(Label(old.scan, old.image, old.action, old.source, novice.weight(old.source)))
+                    novice.remember(Label(old.features, old.action, old.source, novice.weight(old.source)))
             journal, loop = Journal(keep=log.append, write=record.write, publish=publish), ControlLoop(robot)
             with stop_or_interrupt() as stop, request_line(robot, args) as line:
                 service = OperatorService(
