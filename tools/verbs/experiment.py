@@ -24,7 +24,7 @@ from typing import TYPE_CHECKING
 
 from lira.hal.errors import ConfigError
 from lira.tools.experiments.registry import REGISTRY, load, words_of
-from lira.tools.options import natural
+from lira.tools.options import add_json, natural
 
 if TYPE_CHECKING:
     from lira.tools.experiments.output.summary import Summary
@@ -71,7 +71,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add("--workers", type=int, default=1, help="processes side by side (default: %(default)s)")
     add("--scheduler", metavar="ADDRESS", help="run on this Dask cluster instead, like tcp://192.168.1.5:8786")
     add("--run", type=Path, default=FOLDER, metavar="DIR", help="keeps the trials and pages (default: %(default)s)")
-    add("--json", metavar="FILE", help="write a JSON object to FILE (-: standard output)")
+    add_json(parser)
     add("--summaries", type=Path, metavar="DIR", help="summaries of all experiments (default: those of the project)")
     add(
         "--out",
@@ -84,7 +84,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Run the trials that are missing and print the tables."""
     from lira.tools.experiments.output.summary import to_json
-    from lira.tools.verbs.bench import take_stdout, write_file
+    from lira.tools.output.machine import take_stdout, write_file
 
     if args.seeds < 1 or args.workers < 1:
         raise ConfigError("--seeds and --workers are at least 1", "Give a positive number.")
@@ -139,7 +139,7 @@ def play(args: argparse.Namespace, name: str) -> "tuple[Summary, Path]":
 
 def show(summary: "Summary", page: Path) -> None:
     """Print tables, verdicts and where the page is."""
-    from lira.tools.verbs.bench import table
+    from lira.tools.output.machine import table
 
     for each in summary.tables:
         print(f"\n{each.title}\n{table(each.rows)}")
