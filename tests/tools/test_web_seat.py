@@ -96,6 +96,19 @@ def test_a_page_that_is_silent_is_gone():
     assert not seat.alive(10.0 + 1.1 * SILENT_S)
 
 
+def test_a_gap_is_seen_also_by_who_looks_after_it():
+    seat = seated(10.0)
+    seat.take_break()
+    for away in (said(10.05, away=True), said(10.05 - 2 * OLDEST_S)):
+        seat.hear(ANNA, away, 10.05)
+        seat.hear(ANNA, said(10.1), 10.1)
+        assert seat.alive(10.1)
+        assert seat.take_break()
+        assert not seat.take_break()
+    seat.hear(ANNA, said(10.1 + 2 * SILENT_S), 10.1 + 2 * SILENT_S)
+    assert seat.take_break()
+
+
 def test_nobody_hears_a_page_without_the_seat():
     seat = seated(10.0)
     seat.take_said()

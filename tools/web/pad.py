@@ -39,10 +39,11 @@ class PagePad:
             self._near.recv(4096)
         if self._seat.holder() != self._client:
             raise DeviceError("the page has left its seat", "Press Drive on a page.")
+        broken = self._seat.take_break() or not self._seat.alive(time.monotonic())
         states = [pad_of(said, self.mapping) for said in self._seat.take_said()]
         if states:
             self.state = states[-1]
-        if not self._seat.alive(time.monotonic()):
+        if broken:
             raise DeviceError("the page is silent or hidden", "Look at the page; it drives on when it is seen.")
         return states, bool(states)
 
@@ -67,6 +68,7 @@ class PageFinder:
         client = self._seat.holder()
         if client is None or not self._seat.alive(time.monotonic()):
             return None
+        self._seat.take_break()
         self._pad = PagePad(self._seat, self._mapping, client)
         return self._pad
 

@@ -89,6 +89,7 @@ class Seat:
         self._holder: Client | None = None
         self._said: list[Input] = []
         self._heard_s = self._gripped_s = float("-inf")
+        self._broken = False  # there was a gap that the bridge has not seen yet
 
     def take(self, client: Client, now_s: float) -> bool:
         """Sit down, if the seat is free or whoever has it does nothing. Returns whether the client has it now."""
@@ -96,7 +97,7 @@ class Seat:
             if self._holder is not None and self._holder != client and not self._is_idle(now_s):
                 return False
             if self._holder != client:
-                self._holder, self._said = client, []
+                self._holder, self._said, self._broken = client, [], False
                 self._heard_s, self._gripped_s = float("-inf"), now_s
             return True
 
@@ -111,8 +112,10 @@ class Seat:
         with self._lock:
             if self._holder != client:
                 return
+            if self._heard_s < now_s - SILENT_S:
+                self._broken = True  # what comes after a gap does not mend it
             if said.away or not 0.0 <= now_s - said.seen <= OLDEST_S:
-                self._heard_s = float("-inf")
+                self._heard_s, self._broken = float("-inf"), True
                 return
             self._heard_s = now_s
             self._said.append(said)
@@ -124,6 +127,12 @@ class Seat:
         with self._lock:
             said, self._said = self._said, []
             return said
+
+    def take_break(self) -> bool:
+        """Whether there was a gap since the last time: a hand that was on the controls is off."""
+        with self._lock:
+            broken, self._broken = self._broken, False
+            return broken
 
     def holder(self) -> Client | None:
         """Who has the seat."""
