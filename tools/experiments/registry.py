@@ -22,6 +22,7 @@ class Entry(NamedTuple):
 
 REGISTRY = {
     "unseen": Entry("what it takes to pass 11 of 12 layouts that nobody has taught: at equal quality", "unseen"),
+    "laps": Entry("six laps of teaching, 12 fresh layouts alone after each: does more make it worse?", "laps"),
     "table2": Entry("LIRA-SPF and HG-DAgger on line-obstacles (Table II)", "compare"),
     "race": Entry("the same on the 120 m race with 21 boxes (fig. 11, 12)", "compare"),
     "tableC1": Entry("activation thresholds on the figure-eight, redundancy filter off (Table C.1)", "thresholds"),
