@@ -13,6 +13,7 @@ import signal
 import sys
 import tempfile
 from collections.abc import Generator, Iterator
+from pathlib import Path
 
 import pytest
 from hypothesis import settings
@@ -46,6 +47,12 @@ def pytest_configure(config: pytest.Config) -> None:
     """Keep a worker to itself."""
     if hasattr(config, "workerinput") and sys.platform == "linux":
         take_own_loopback()
+
+
+def pytest_ignore_collect(collection_path: Path, config: pytest.Config) -> bool | None:
+    """With `-m unit` do not even import what is none: that takes longer than the unit tests."""
+    asked, is_test = config.getoption("markexpr"), collection_path.match("test_*.py")
+    return True if asked == "unit" and is_test and kind_of(collection_path) != "unit" else None
 
 
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
