@@ -18,7 +18,8 @@ from tempfile import TemporaryDirectory
 
 import numpy as np
 
-from lira.hal.bus.bus import Bus, Reader
+from lira.hal.bus.bus import Bus
+from lira.hal.bus.reader import Reader
 from lira.hal.bus.topics import APPLIED
 from lira.hal.client.remote import RemoteRobot
 from lira.hal.errors import BusError

@@ -106,7 +106,6 @@ def undo(args: argparse.Namespace) -> int:
 def explain(args: argparse.Namespace) -> int:
     """Say which labels make an action."""
     from lira.fusion.log.label_log import read_demonstrations
-    from lira.fusion.preprocess import Features
     from lira.tools.labels.choose import nearest, one_of
     from lira.tools.labels.relearn import relearn
     from lira.tools.labels.words import pair, part_rows, part_table
@@ -118,7 +117,7 @@ def explain(args: argparse.Namespace) -> int:
     at = one_of(labels, wanted_of(args).numbers) if args.number else nearest(labels, args.time, args.run)
     novice, learned = relearn(path)
     label = labels[at]
-    seen = Features(label.scan, label.image)
+    seen = label.features
     rows = part_rows(novice.explain(seen), learned, labels)
     action, alone, deviation = novice.act(seen), novice.alone(seen), novice.deviation(seen)
     where = f"label {at} (run {label.run}, lap {label.lap}, {label.stamp_s:.1f} s) says {pair(label.action)}"
