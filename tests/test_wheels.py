@@ -32,10 +32,18 @@ class Index:
     """What pip's index said: of each package, what it requires. The versions are those of constraints.txt."""
 
     requires: dict[str, list[str]] = field(default_factory=dict)
+    everywhere: set[str] = field(default_factory=set)  # pure Python, so that one answer is enough
+    stable: dict[tuple[str, str], int] = field(default_factory=dict)  # on a processor, from Python 3.x on (abi3)
+
+    def knows(self, name, python, processor):
+        """Whether it was said already that a package has a wheel there."""
+        return name in self.everywhere or self.stable.get((name, processor), 99) <= int(python.split(".")[1])
 
     def lacks(self, names, python, processor):
         """Which of these have no wheel; notes what the others require. One question for all, if all have one."""
-        names = sorted(names)
+        names = sorted(name for name in names if not self.knows(name, python, processor))
+        if not names:
+            return set()
         answer = self._ask(names, python, processor)
         if answer is not None:
             return set()
@@ -64,6 +72,11 @@ class Index:
         for each in report["install"]:
             name = canonicalize_name(each["metadata"]["name"])
             self.requires[name] = each["metadata"].get("requires_dist", [])
+            *_, abi, platform = each["download_info"]["url"].removesuffix(".whl").split("-")
+            if platform == "any":
+                self.everywhere.add(name)
+            elif abi == "abi3":
+                self.stable[name, processor] = int(python.split(".")[1])
         return report
 
 
