@@ -16,6 +16,7 @@ from lira.fusion.log.label_file import Demonstration, Format, read_format
 from lira.fusion.log.label_log import read_demonstrations, read_records
 from lira.fusion.log.label_salvage import lock, survey
 from lira.hal.errors import ConfigError, StorageError
+from lira.hal.messages import Driver
 
 
 def last_intervention(labels: Sequence[Demonstration]) -> list[int]:
@@ -25,7 +26,7 @@ def last_intervention(labels: Sequence[Demonstration]) -> list[int]:
     source's between them, in one run and lap.
     """
     kept = [(number, label) for number, label in enumerate(labels) if label.stored]
-    runs = groupby(kept, key=lambda each: (each[1].source == "human", each[1].run, each[1].lap))
+    runs = groupby(kept, key=lambda each: (each[1].source == Driver.HUMAN, each[1].run, each[1].lap))
     interventions = [[number for number, _ in members] for (human, _, _), members in runs if human]
     return interventions[-1] if interventions else []
 

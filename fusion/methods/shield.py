@@ -22,9 +22,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from lira.fusion.methods.base import STAND, Call, Choice, Lesson, Method, Policy, Proposal
+from lira.fusion.methods.base import STAND, Choice, Lesson, Method, Policy, Proposal
 from lira.fusion.preprocess import Features
-from lira.hal.messages import Action, FloatArray
+from lira.hal.messages import Action, Call, FloatArray
 from lira.hal.profile import RobotProfile
 
 DRIVER = "shield"  # as whom a step is recorded in which it changed the turn

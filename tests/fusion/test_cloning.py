@@ -1,7 +1,7 @@
 from taught import FEATURES, make_novice
 
-from lira.fusion.methods.base import Call
 from lira.fusion.methods.rivals.cloning import Cloning
+from lira.hal.messages import Call
 
 FAR = (-1.0, 1.0)
 

@@ -7,10 +7,10 @@ import pytest
 
 from lira.fusion.learning.novice import LearningSettings, NetworkNovice, is_redundant
 from lira.fusion.log.counts import Ledger
-from lira.fusion.methods.base import Call, Expert
+from lira.fusion.methods.base import Expert
 from lira.fusion.methods.lira import PRESETS, LiraSettings, LiraSpf, activation, choose, in_consensus
 from lira.fusion.preprocess import Features
-from lira.hal.messages import ExpertView
+from lira.hal.messages import Call, ExpertView
 
 T = 0.20
 NOVICE = (0.9, -0.3)

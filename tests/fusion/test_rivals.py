@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from taught import FEATURES, make_novice
 
-from lira.fusion.methods.base import STAND, Call
+from lira.fusion.methods.base import STAND
 from lira.fusion.methods.rivals.ensemble_dagger import EnsembleDagger, EnsembleDaggerSettings
 from lira.fusion.methods.rivals.gated import RobotGated, discrepancy
 from lira.fusion.methods.rivals.intervention_weighted import OWN, InterventionWeighted
@@ -14,6 +14,7 @@ from lira.fusion.methods.rivals.lazy_dagger import LazyDagger, LazyDaggerSetting
 from lira.fusion.methods.rivals.probe import START, Probe
 from lira.fusion.methods.rivals.thrifty_dagger import ThriftyDagger, ThriftyDaggerSettings
 from lira.fusion.preprocess import Features
+from lira.hal.messages import Call
 
 NOVICE = (0.9, -0.3)
 FAR = (1.0, 1.0)

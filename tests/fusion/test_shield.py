@@ -6,10 +6,11 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from lira.fusion.methods.base import STAND, Alone, Call, Method
+from lira.fusion.methods.base import STAND, Alone, Method
 from lira.fusion.methods.doubt import Doubtful
 from lira.fusion.methods.shield import DRIVER, HORIZON_S, MARGINS_M, STEPS, Shield, Shielded, arcs
 from lira.fusion.preprocess import Features
+from lira.hal.messages import Call
 from lira.hal.profile import load_profile
 
 SIM, REAL = load_profile("thesis-sim"), load_profile("rosbot2")

@@ -32,7 +32,7 @@ SCAN = of_kind(LaserScan)[0]
 def fields(message: object) -> list[object]:
     """Comparable values, so that nan equals nan and arrays compare."""
     values = [getattr(message, name) for name in type(message).__dataclass_fields__]
-    return [repr(v.tolist()) + str(v.shape) if isinstance(v, np.ndarray) else repr(v) for v in values]
+    return [repr(v.tolist()) + str(v.shape) if isinstance(v, np.ndarray) else str(v) for v in values]
 
 
 def independent(message: object) -> object:

@@ -4,14 +4,14 @@ import math
 
 import pygame
 
-from lira.hal.messages import Action, ExpertView, LaserScan
+from lira.hal.messages import Action, Call, ExpertView, LaserScan
 from lira.tools.console.palette import AMBER, BACK, BLUE, DIM, EDGE, GREEN, PANEL, RED, SKY, TEXT, panel, write
 from lira.tools.console.state import LOW_V, STALE_S, View, battery_share, driver_words, operator_words
 
 SIZE = (1280, 680)  # fits a screen of 1366 by 768 with a desktop's bar and a window's frame
 CALL_WORDS = {
-    "attention": ("ATTENTION", "one expert drives: watch it", AMBER, (0, 0, 0)),
-    "feedback": ("YOUR DECISION", "experts disagree: take control", RED, (255, 255, 255)),
+    Call.ATTENTION: ("ATTENTION", "one expert drives: watch it", AMBER, (0, 0, 0)),
+    Call.FEEDBACK: ("YOUR DECISION", "experts disagree: take control", RED, (255, 255, 255)),
 }
 BANNER = pygame.Rect(560, 108, 704, 84)
 
@@ -92,7 +92,7 @@ def draw_driver(surface: pygame.Surface, box: pygame.Rect, view: View) -> None:
     write(surface, why, (box.x + 26, box.y + 50), 26, DIM)
 
 
-def draw_call(surface: pygame.Surface, box: pygame.Rect, call: str) -> None:
+def draw_call(surface: pygame.Surface, box: pygame.Rect, call: Call) -> None:
     """The banner of a call: amber triangle for attention, red octagon for feedback, an empty frame for none."""
     if call not in CALL_WORDS:
         pygame.draw.rect(surface, EDGE, box, 1, border_radius=6)
@@ -101,11 +101,11 @@ def draw_call(surface: pygame.Surface, box: pygame.Rect, call: str) -> None:
     word, rest, colour, ink = CALL_WORDS[call]
     pygame.draw.rect(surface, colour, box, border_radius=6)
     x, y = box.x + 52, box.centery
-    corners, start = (3, -math.pi / 2) if call == "attention" else (8, math.pi / 8)
+    corners, start = (3, -math.pi / 2) if call == Call.ATTENTION else (8, math.pi / 8)
     angles = [start + 2 * math.pi * k / corners for k in range(corners)]
     shape = [(x + 32 * math.cos(a), y + 32 * math.sin(a) + (6 if corners == 3 else 0)) for a in angles]
     pygame.draw.polygon(surface, ink, shape)
-    write(surface, "!" if call == "attention" else "?", (x, y + 4), 40, colour, centre=True)
+    write(surface, "!" if call == Call.ATTENTION else "?", (x, y + 4), 40, colour, centre=True)
     write(surface, word, (box.x + 104, box.y + 12), 48, ink)
     write(surface, rest, (box.x + 104, box.y + 52), 26, ink)
 

@@ -2,11 +2,13 @@
 
 import numpy as np
 
+from lira.hal.messages import Call
+
 RATE_HZ = 22050
 # Attention: one short high tone. Feedback: a falling pair, twice.
 ATTENTION = ((880.0, 0.18),)
 FEEDBACK = ((523.0, 0.18), (349.0, 0.26), (523.0, 0.18), (349.0, 0.26))
-CALLS = {"attention": ATTENTION, "feedback": FEEDBACK}
+CALLS = {Call.ATTENTION: ATTENTION, Call.FEEDBACK: FEEDBACK}
 
 
 def samples(tones: tuple[tuple[float, float], ...]) -> bytes:

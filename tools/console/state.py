@@ -7,11 +7,14 @@ from lira.hal.messages import (
     Applied,
     BatteryState,
     ByteArray,
+    Call,
     Decision,
+    Driver,
     LaserScan,
     Odometry,
     OperatorAnswer,
     Request,
+    Source,
 )
 from lira.tools.joystick.deadman import State
 
@@ -65,9 +68,9 @@ class View:
         return self.answering is not None and self.answering.paused
 
     @property
-    def call(self) -> str:
-        """The call that is on now, or "none"."""
-        return "none" if self.deciding is None else self.deciding.call
+    def call(self) -> Call:
+        """The call that is on now."""
+        return Call.NONE if self.deciding is None else self.deciding.call
 
 
 def driver_words(view: View) -> tuple[str, str]:
@@ -82,7 +85,7 @@ def driver_words(view: View) -> tuple[str, str]:
         return "HUMAN", _named(view.applied, why)
     if view.paused:
         return "PAUSED", "it stands and learns nothing; P, or square on the pad, goes on"
-    if view.applied.source == "none":
+    if view.applied.source is Source.NONE:
         return "STANDS", REASONS.get(view.applied.reason, view.applied.reason)
     who, why = policy_words(view.deciding)
     return who, _named(view.applied, why)
@@ -120,15 +123,15 @@ def policy_words(decision: Decision | None) -> tuple[str, str]:
     if decision is None:
         return "POLICY", "it does not say how it decides"
     if decision.driver == "shield":
-        stands = decision.call == "feedback"
+        stands = decision.call == Call.FEEDBACK
         return "SHIELD", "no turn is clear: it stands and asks you" if stands else "the novice would touch something"
-    if decision.call == "feedback":
+    if decision.call == Call.FEEDBACK:
         return decision.driver.upper(), "experts disagree: it drives slowly and asks you"
-    if decision.driver == "novice":
+    if decision.driver == Driver.NOVICE:
         return "NOVICE", "no expert is active"
-    if decision.driver == "mean":
+    if decision.driver == Driver.MEAN:
         return "EXPERTS' MEAN", "active experts agree"
-    if decision.driver == "human":
+    if decision.driver == Driver.HUMAN:
         return "WAITS FOR YOU", "demonstrate first: it has learned nothing yet"
     return f"EXPERT {decision.driver.upper()}", "it alone is active"
 

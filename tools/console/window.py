@@ -9,7 +9,7 @@ from dataclasses import replace
 import pygame
 
 from lira.hal.errors import StorageError
-from lira.hal.messages import Request
+from lira.hal.messages import Call, Request
 from lira.tools.console import sound
 from lira.tools.console.draw import SIZE, draw
 from lira.tools.console.keyboard import keyboard_mapping, pad_of
@@ -105,7 +105,7 @@ def show(look: Callable[[], View], keyboard: Keyboard | None, stop: threading.Ev
         screen = pygame.display.set_mode(SIZE, pygame.RESIZABLE | pygame.SCALED)
         pygame.display.set_caption("lira console")
         pressed: frozenset[str] = frozenset()
-        call, due_s = "none", time.monotonic()
+        call, due_s = Call.NONE, time.monotonic()
         while not stop.is_set():
             for event in pygame.event.get():
                 if event.type == pygame.QUIT:

@@ -1,6 +1,6 @@
 """What calls feel like. Pure: a pattern is a list of (strength, seconds), strength in [0, 1]."""
 
-from lira.hal.messages import JoyFeedback
+from lira.hal.messages import Call, JoyFeedback
 
 Pattern = tuple[tuple[float, float], ...]
 
@@ -9,7 +9,7 @@ ATTENTION: Pattern = ((0.5, 0.12), (0.0, 0.10), (0.5, 0.12))
 FEEDBACK: Pattern = ((1.0, 0.35), (0.0, 0.12), (1.0, 0.35), (0.0, 0.12), (1.0, 0.35))
 # A request was taken: one tap.
 TAKEN: Pattern = ((0.5, 0.08),)
-CALLS = {"attention": ATTENTION, "feedback": FEEDBACK}
+CALLS = {Call.ATTENTION: ATTENTION, Call.FEEDBACK: FEEDBACK}
 
 # `JoyFeedback.id` of our patterns; any other id is a plain rumble of the message's intensity.
 ATTENTION_ID, FEEDBACK_ID = 10, 11

@@ -24,7 +24,7 @@ from lira.fusion.teaching.curriculum import Curriculum, curriculum
 from lira.fusion.teaching.session import Same, Session
 from lira.fusion.teaching.teacher import ScriptedTeacher
 from lira.hal.errors import LiraError
-from lira.hal.messages import Action
+from lira.hal.messages import Action, Driver
 from lira.hal.profile import RobotProfile, load_profile
 from lira.sim_backend.catalogue import load_world
 from lira.sim_backend.foresight import Foresight, with_small_camera
@@ -94,7 +94,7 @@ def blindfolded(profile: RobotProfile) -> RobotProfile:
 
 def measure_cruise(network: Network, profile: RobotProfile, course: Curriculum) -> Action:
     """Median action where the world is straight and empty: what the expert does with nothing to react to."""
-    alone = Alone("novice", network.act)
+    alone = Alone(Driver.NOVICE, network.act)
     with simulate(course.cruise_world, profile) as robot:
         loop = ControlLoop(robot)
         loop.arm()

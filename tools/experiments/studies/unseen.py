@@ -12,6 +12,7 @@ from msgspec.structs import replace
 
 from lira.fusion.methods.presets import METHODS, Preset
 from lira.fusion.methods.syllabus import with_proof
+from lira.hal.messages import Phase
 from lira.tools.experiments import pairs
 from lira.tools.experiments.experiment import Experiment, Outcomes, Picture, Row, Table
 from lira.tools.experiments.measures import by_method, driving_row, effort_row, label_row, median, method_rows
@@ -49,7 +50,7 @@ def by_name(outcomes: Outcomes) -> dict[str, list[Outcome]]:
 def quality_row(group: Sequence[Outcome]) -> Row:
     """Effort, medians with the 90 % quantile and the worst; and the unseen layouts, with the share's 95 % interval."""
     final = [outcome.result for outcome in group]
-    unseen = [lap for outcome in group for lap in outcome.laps if lap.phase == "unseen"]
+    unseen = [lap for outcome in group for lap in outcome.laps if lap.phase == Phase.UNSEEN]
     passed = sum(lap.passed for lap in unseen)
     low, high = share(passed, len(unseen))
     row: Row = {"n": len(group)}
