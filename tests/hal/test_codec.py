@@ -53,6 +53,19 @@ def test_round_trip(message):
     assert fields(back) == fields(message)
 
 
+@pytest.mark.parametrize(("field", "word"), [("phase", "holiday"), ("call", "shout")])
+def test_a_decision_in_a_phase_or_with_a_call_that_there_is_none_of_is_no_decision(field, word):
+    ros = CODECS[Decision].to_ros(DECISION)
+    setattr(ros, field, word)
+    with pytest.raises(CodecError, match=word):
+        decode(Decision, bytes(TYPES.serialize_cdr(ros, ros_type_of(Decision))))
+
+
+def test_on_the_wire_who_drove_is_a_word():
+    ros = CODECS[Decision].to_ros(replace(DECISION, driver=Driver.HUMAN))
+    assert (type(ros.driver), ros.driver) == (str, "human")
+
+
 def test_every_message_with_a_codec_is_tested():
     assert {type(message) for message in MESSAGES} == set(CODECS)
 
