@@ -4,6 +4,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 SEEDS := 10
 WORKERS := 2
+TEST_WORKERS := 6
 EXPERTS := $(foreach task,line eight passage garden corridor,camera:--task:$(task)) \
   $(foreach task,line passage garden,lidar:--task:$(task))
 BENCHES := twin lockstep latency train preprocess step log drivers takeover
@@ -27,9 +28,10 @@ $(VENV)/.installed: pyproject.toml constraints.txt
 demo: setup ## teach a robot in the twin, from start to report
 	$(BIN)/lira demo
 
-test: setup ## every test: the quick ones side by side, then those that need the machine for themselves
-	$(BIN)/python -m pytest -m "not processes" --numprocesses 2 --dist worksteal
-	$(BIN)/python -m pytest -m processes
+# Most tests wait for processes, so more run beside each other than there are processors.
+test: setup ## every test: most beside each other, then those that need the machine for themselves
+	$(BIN)/python -m pytest --crowd --numprocesses $(TEST_WORKERS) --dist worksteal
+	$(BIN)/python -m pytest --alone
 
 test-fast: setup ## the unit tests, in under a minute
 	$(BIN)/python -m pytest -m unit --numprocesses 2 --dist worksteal
