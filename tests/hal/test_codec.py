@@ -2,6 +2,7 @@
 
 import math
 import random
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -13,6 +14,8 @@ from lira.hal.messages import (
     Applied,
     Clock,
     CompressedImage,
+    Decision,
+    Driver,
     Image,
     Imu,
     LaserScan,
