@@ -5,8 +5,8 @@ ends when the expert alone passes all drives of its curriculum. The experts that
 this command with its defaults.
 
 tasks: line (line-obstacles, race, eight-obstacles), eight, passage, garden, corridor, table-top. The lidar expert of the
-eight is the line's, that of the corridor the garden's; table-top has only a depth expert of its own. A pair of one's own for --experts DIR: --out DIR/camera.safetensors and
-DIR/lidar.safetensors.
+eight is the line's, that of the corridor the garden's; table-top has a depth expert, and both others of the line. Experts
+of one's own for --experts DIR: --out DIR/camera.safetensors, DIR/lidar.safetensors and what else the robot learns from.
 
 examples:
   lira train-expert camera
