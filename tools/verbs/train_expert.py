@@ -4,9 +4,9 @@ The scripted teacher drives whenever the young expert would err; only what the t
 ends when the expert alone passes all drives of its curriculum. The experts that come with the project were made by
 this command with its defaults.
 
-tasks: line (line-obstacles, race, eight-obstacles), eight, passage, garden, corridor, table-top. The lidar expert of the
-eight is the line's, that of the corridor the garden's; table-top has a depth expert, and both others of the line. Experts
-of one's own for --experts DIR: --out DIR/camera.safetensors, DIR/lidar.safetensors and what else the robot learns from.
+tasks: line (line-obstacles, race, eight-obstacles), eight, passage, garden, corridor, table-top. The lidar expert of
+the eight is the line's, that of the corridor the garden's; table-top has a depth expert, and both others of the line.
+Experts of one's own for --experts DIR: --out DIR/camera.safetensors, DIR/lidar.safetensors, one for each sensor.
 
 examples:
   lira train-expert camera
@@ -20,7 +20,7 @@ from pathlib import Path
 
 from lira.fusion.experts.tasks import DEFAULT, TASKS
 from lira.hal.errors import ConfigError, LiraError, StorageError
-from lira.tools.options import natural
+from lira.tools.options import add_seed
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -30,7 +30,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("expert", choices=EXPERTS, help="which sensor it sees")
     parser.add_argument("--task", choices=TASKS, default=DEFAULT, help="what it is for (default: %(default)s)")
     parser.add_argument("--profile", help="robot profile (default: the task's)")
-    parser.add_argument("--seed", type=natural, default=0, help="seed of everything random (default: %(default)s)")
+    add_seed(parser, "seed of everything random")
     parser.add_argument("--out", type=Path, help="checkpoint to write (default: the one that comes with the project)")
 
 
