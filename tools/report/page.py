@@ -9,7 +9,7 @@ from importlib import resources
 import cv2
 import numpy as np
 
-from lira.hal.messages import Call, Phase
+from lira.hal.messages import Call, Driver, Phase
 from lira.tools.output.proven import contradiction_words, proof_words, unseen_words
 from lira.tools.report import plots
 from lira.tools.report.course import course
@@ -142,8 +142,9 @@ def caption(lap: Lap) -> str:
 def drivers(run: Run) -> list[tuple[str, str]]:
     """Who drove in this run: words for the legend and the style's name."""
     seen = {step.decision.driver for _, step in run.steps()}
-    known = [("novice", "novice"), ("human", "human"), *((name, f"{name} expert") for name in run.experts)]
-    known += [("mean", "mean of the experts"), ("shield", "the shield, instead of the novice")]
+    known: list[tuple[str, str]] = [(Driver.NOVICE, "novice"), (Driver.HUMAN, "human")]
+    known += [(name, f"{name} expert") for name in run.experts]
+    known += [(Driver.MEAN, "mean of the experts"), ("shield", "the shield, instead of the novice")]
     return [(words, plots.driver_class(name, run.experts)) for name, words in known if name in seen]
 
 
