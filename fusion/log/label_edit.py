@@ -15,6 +15,7 @@ from lira.fusion.log.label_file import Demonstration, Format, read_format
 from lira.fusion.log.label_log import read_demonstrations, read_records
 from lira.fusion.log.label_salvage import lock, survey
 from lira.hal.errors import ConfigError, StorageError
+from lira.hal.messages import Driver
 
 PAUSE_S = 1.0  # two decisions of the slowest robot; a hand that was off for so long has come back
 
@@ -28,7 +29,7 @@ def last_intervention(labels: Sequence[Demonstration]) -> list[int]:
     interventions: list[list[int]] = [[]]
     last: Demonstration | None = None
     for number, label in enumerate(labels):
-        if label.source != "human":
+        if label.source != Driver.HUMAN:
             last = None if label.stored else last
             continue
         if last is None or (label.run, label.lap) != (last.run, last.lap) or label.stamp_s > last.stamp_s + PAUSE_S:

@@ -14,12 +14,12 @@ import numpy as np
 from msgspec import Meta
 from numpy.typing import NDArray
 
-from lira.fusion.methods.base import STAND, Call, Policy, Proposal
+from lira.fusion.methods.base import STAND, Policy, Proposal
 from lira.fusion.preprocess import Preprocessor
 from lira.fusion.teaching.foresight import Foresight
 from lira.fusion.teaching.planner import COMFORT_M, Planner
 from lira.hal.config import Table
-from lira.hal.messages import Action, CourseState, Observation
+from lira.hal.messages import Action, Call, CourseState, Observation
 from lira.hal.profile import RobotProfile
 
 Share = Annotated[float, Meta(ge=0.0, le=1.0)]

@@ -28,6 +28,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from lira.hal.errors import ConfigError, MissingExtraError
+from lira.hal.messages import Phase
 from lira.tools.options import add_expert, add_layout, add_protocol, add_seed, natural
 
 if TYPE_CHECKING:
@@ -192,7 +193,7 @@ def conclude(folder: Path) -> int:
 
     run = load_run(folder / RECORD)
     print(f"\n{format_table(COLUMNS, [lap_cells(lap) for lap in run.laps])}\n")
-    unseen = [lap.record for lap in run.phase("unseen") if lap.record is not None]
+    unseen = [lap.record for lap in run.phase(Phase.UNSEEN) if lap.record is not None]
     proven = run.result is not None and run.result.converged
     said = [unseen_words(unseen)]
     if run.result is not None:
