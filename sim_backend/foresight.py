@@ -60,9 +60,17 @@ class Foresight:
         self.course = Course(build(self._world, layout), footprint_radius_m(self._profile.base))
 
     def rollout(
-        self, state: CourseState, policy: Callable[[Observation], Action], steps: int, period_s: float
+        self,
+        state: CourseState,
+        policy: Callable[[Observation], Action],
+        steps: int,
+        period_s: float,
+        ends: Callable[[CourseState], bool] = lambda _: False,
     ) -> list[CourseState]:
-        """Let `policy` drive from `state`: the state after each of `steps`, the last being a collision or a loss."""
+        """Let `policy` drive from `state`: the state after each of `steps`.
+
+        The last is a collision, a loss, or the first that `ends` it: what comes after is not looked at.
+        """
         twin, base = self._twin, self._profile.base
         twin.open()
         twin.place(self.course.layout.seed, state)
@@ -73,7 +81,7 @@ class Foresight:
             twin.drive(Command(twist, twin.now()))
             twin.wait(twin.now() + period_s)
             states.append(twin.state())
-            if states[-1].collided or states[-1].lost:
+            if states[-1].collided or states[-1].lost or ends(states[-1]):
                 break
         return states
 
