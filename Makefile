@@ -56,7 +56,7 @@ bench: setup ## all benchmarks, into runs/bench/; fails where a ratio in bench/h
 	  $(BIN)/lira bench $$name --json runs/bench/$$name.json --history bench/history || failed=1; \
 	done; exit $$failed
 
-results: setup ## every experiment of the thesis, then RESULTS.md; goes on where it was stopped
+results: setup ## every experiment, then RESULTS.md and docs/results; goes on where it was stopped
 	$(BIN)/lira experiment all --seeds $(SEEDS) --workers $(WORKERS)
 
 # Each expert's header holds the command that made it.

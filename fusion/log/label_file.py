@@ -175,7 +175,7 @@ class Format:
         """What was seen, of a record's bytes; None if that cannot have been."""
         arrays, at = {}, _FIELDS.size
         for name, shape in self.features:
-            kept = np.frombuffer(data, _dtype(name), math.prod(shape), at).reshape(shape)
+            kept = np.frombuffer(data, _dtype(name), math.prod(shape), at).reshape(shape).copy()  # learners may write
             arrays[name] = MODALITIES[name].restore(kept)
             at += kept.nbytes
             if not (np.abs(arrays[name]).max() <= LIMIT and math.isfinite(arrays[name].sum())):

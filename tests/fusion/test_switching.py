@@ -11,7 +11,7 @@ CAMERA, LIDAR = (1.0, 0.1), (0.5, -0.8)
 def seeing(nearest_m):
     scan = np.ones(101, np.float32)
     scan[40] = nearest_m / 4.0
-    return Features(**{**FEATURES, "scan": scan})
+    return Features(scan=scan, image=FEATURES.image)
 
 
 def drivers(rule, *nearest_m):

@@ -452,7 +452,6 @@ def test_what_is_narrow_takes_one_after_the_other():
 # Of each setup what no other test of the suite breaks; `lira stop-test` tries them all.
 IN_SHORT = {
     "twin": ("hand's bridge killed (kill -9)", "second commander", "lidar freezes"),
-    "learner": ("disk full under labels and record",),
     "link": ("link's process frozen (SIGSTOP)",),
     "drivers": ("robot's governor hangs", "board hears no more"),
     "keys": ("put without a certificate",),

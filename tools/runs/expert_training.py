@@ -41,7 +41,7 @@ def train_expert(kind: str, task: str, profile: RobotProfile, seed: int, path: P
     world = load_world(course.world)
     profile = blindfolded(profile) if kind == "lidar" else with_small_camera(profile)
     sees = next(row for row in modalities_of(profile) if row.sensor == kind)
-    network: Network = ExpertNet(sees.name, sees.shape(profile), profile.features.filters, seed=seed)
+    network = ExpertNet(sees.name, sees.shape(profile), profile.features.filters, seed=seed)
     novice = NetworkNovice(network, InlineTrainer(Learner(network, seed=seed, frozen_trunks=False)), LearningSettings())
     with (
         simulate(world, profile, seed=seed, renderer="sketch") as robot,

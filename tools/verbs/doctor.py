@@ -16,6 +16,9 @@ import json
 import sys
 from pathlib import Path
 
+from lira.hal.bus.endpoint import DEFAULT_ROBOT
+from lira.tools.options import add_json, add_profile
+
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
@@ -26,13 +29,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add("--pad", action="store_true", help="look at the gamepad")
     add("--device", metavar="PATH", help="the pad's /dev/input/event* or a link to it (default: the first that fits)")
     add("--connect", metavar="HOST:PORT", help="look at the way to a robot")
-    add("--name", default="rosbot", help="the robot's name on the bus (default: %(default)s)")
-    add("--profile", default="rosbot2", help="robot by name or .toml file (default: %(default)s)")
+    add("--name", default=DEFAULT_ROBOT, help="the robot's name on the bus (default: %(default)s)")
+    add_profile(parser, "rosbot2")
     add("--settings", type=Path, metavar="FILE", help="how this robot is mounted and calibrated")
     add("--openni", type=Path, metavar="DIR", help="folder of OpenNI2, for openni: cameras")
     add("--seconds", type=float, default=4.0, metavar="S", help="how long each device is looked at (default: 4)")
     add("--out", type=Path, metavar="FILE", help="keep a picture of the camera")
-    add("--json", metavar="FILE", help="write a JSON object to FILE (-: standard output)")
+    add_json(parser)
 
 
 def run(args: argparse.Namespace) -> int:
@@ -41,7 +44,7 @@ def run(args: argparse.Namespace) -> int:
     from lira.hal.profile import load_profile
     from lira.tools.doctor.checks import examine, worst
     from lira.tools.doctor.finding import Level, Patient
-    from lira.tools.verbs.bench import take_stdout, write_file
+    from lira.tools.output.machine import take_stdout, write_file
 
     if not 0.5 <= args.seconds <= 600.0:
         raise ConfigError(f"--seconds {args.seconds} is out of range", "Give 0.5 to 600.")

@@ -19,6 +19,7 @@ from pathlib import Path
 
 from lira.hal.errors import DeviceError
 from lira.tools.launch.lifetime import CLOSE_S, stop_or_interrupt
+from lira.tools.options import add_client
 
 ANSWER_S = 10.0
 
@@ -26,8 +27,7 @@ ANSWER_S = 10.0
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
     add = parser.add_argument
-    add("--name", default="rosbot", help="the robot's name on the bus (default: %(default)s)")
-    add("--connect", default="127.0.0.1:7447", metavar="HOST:PORT", help="where the robot is (default: %(default)s)")
+    add_client(parser)
     add("--pad", metavar="NAME|FILE", help="layout of the pad by name, or a .toml file (default: by what the pad is)")
     add("--device", metavar="PATH", help="the pad's /dev/input/event* or a link to it (default: the first that fits)")
     add("--learn", type=Path, metavar="FILE", help="ask for each control and write a new pad's file, then end")

@@ -26,6 +26,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from lira.hal.errors import ConfigError
+from lira.tools.options import add_json
 
 if TYPE_CHECKING:
     from lira.fusion.log.label_salvage import Survey
@@ -50,7 +51,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--repair", action="store_true", help="check: put a clean file in its place, and keep the damaged one beside it"
     )
     add("--profile", help="check: whose labels they are, if the file does not say (default: the known robots)")
-    add("--json", metavar="FILE", help="write a JSON object to FILE (-: standard output)")
+    add_json(parser)
 
 
 def run(args: argparse.Namespace) -> int:
@@ -179,7 +180,7 @@ def wanted_of(args: argparse.Namespace) -> "Wanted":
 
 def tell(args: argparse.Namespace, found: dict[str, Any], said: str) -> int:
     """Write JSON where it is wanted, and say the same in words unless JSON goes where they would."""
-    from lira.tools.verbs.bench import write_file
+    from lira.tools.output.machine import write_file
 
     text = json.dumps(found, indent=2)
     if args.json not in (None, "-"):

@@ -138,7 +138,7 @@ def findings(outcomes: Outcomes) -> list[Finding]:
 
 def figures(outcomes: Outcomes) -> list[Picture]:
     """Training, the final drives and the experts alone from above."""
-    from lira.tools.experiments import plots
+    from lira.tools.experiments.output import plots
 
     trial = outcomes[0].trial
     tracks = {f"{name} expert alone": alone(name, trial)[1] for name in experts_of(trial.profile)}
