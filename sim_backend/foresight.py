@@ -14,7 +14,7 @@ from lira.sim_backend.course import Course, Place, footprint_radius_m
 from lira.sim_backend.drive import Motion
 from lira.sim_backend.layout import build
 from lira.sim_backend.polyline import Floats
-from lira.sim_backend.scenes.opening import Renderer
+from lira.sim_backend.scenes.opening import Renderer, quickest
 from lira.sim_backend.twin import Twin
 from lira.sim_backend.world import World
 
@@ -48,11 +48,12 @@ class Foresight:
     """
 
     def __init__(
-        self, profile: RobotProfile, world: str | World, layout: int = 0, *, renderer: Renderer = "sketch"
+        self, profile: RobotProfile, world: str | World, layout: int = 0, *, renderer: Renderer | None = None
     ) -> None:
         self._profile = profile
         self._world = load_world(world) if isinstance(world, str) else world
-        self._twin = Twin(with_small_camera(profile), self._world, layout=layout, renderer=renderer)
+        body = with_small_camera(profile)
+        self._twin = Twin(body, self._world, layout=layout, renderer=renderer or quickest(self._world))
         self.set_layout(layout)
 
     def set_layout(self, layout: int) -> None:
