@@ -53,7 +53,7 @@ class Rosbot:
         self._supervisors = {"base": Supervisor("base", self.base.session)}
         if devices.lidar is not None:
             self.lidar = RPLidar(devices.lidar, profile.lidar, devices.settings.lidar, self._see_scan)
-            self._supervisors["lidar"] = Supervisor("lidar", self.lidar.session)
+            self._supervisors["lidar"] = Supervisor("lidar", self.lidar.session, self.lidar.rest)
         if devices.camera is not None:
             depth = devices.settings.camera.depth or profile.depth is not None
             camera = CameraDevice(devices.camera, profile.camera, self._see_picture, devices.openni_folder, depth=depth)

@@ -14,7 +14,8 @@ from lira.hal.messages import Command, CompressedImage, CourseState, Episode, Im
 from lira.hal.profile import RobotProfile
 from lira.sim_backend.emulators.camera import MjpegServer
 from lira.sim_backend.emulators.core2 import Core2Unit, Firmware
-from lira.sim_backend.emulators.rplidar import Model, RplidarUnit
+from lira.sim_backend.emulators.rplidar import RplidarUnit
+from lira.sim_backend.emulators.rplidar_models import Model
 from lira.sim_backend.emulators.wire import Wire
 from lira.sim_backend.polyline import Floats
 from lira.sim_backend.twin import Twin

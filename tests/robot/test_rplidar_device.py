@@ -17,15 +17,15 @@ from lira.robot.rplidar import protocol
 from lira.robot.rplidar.device import RPLidar
 from lira.robot.settings import LidarSettings
 from lira.robot.supervisor import Supervisor
-from lira.sim_backend.emulators.rplidar import (
+from lira.sim_backend.emulators.rplidar import RplidarUnit, descriptor
+from lira.sim_backend.emulators.rplidar_models import (
     DENSE_MODE,
     EXPRESS_MODE,
     STANDARD_MODE,
+    ULTRA_MODE,
     Model,
-    RplidarUnit,
-    descriptor,
-    seal,
 )
+from lira.sim_backend.emulators.rplidar_streams import seal
 from lira.sim_backend.emulators.wire import Wire
 
 LIDAR = load_profile("rosbot2").lidar
@@ -48,7 +48,7 @@ class Bench:
         self.wire = Wire(path, self.unit)
         self.scans = []
         self.driver = RPLidar(str(path), LIDAR, settings, self.scans.append)
-        self.supervisor = Supervisor("lidar", self.driver.session)
+        self.supervisor = Supervisor("lidar", self.driver.session, self.driver.rest)
 
     def __enter__(self):
         self.supervisor.start()
@@ -75,19 +75,22 @@ def around(scan, degrees, within=3):
     return np.nanmedian([at(scan, degrees + offset) for offset in range(-within, within + 1)])
 
 
-MODELS = {
+DENSE = replace(DENSE_MODE, sample_s=100e-6)
+UNITS = {
     "express, old firmware": (Model(firmware=(1, 20)), "EXPRESS"),
     "standard, oldest firmware": (Model(firmware=(1, 10), modes=(STANDARD_MODE,)), "STANDARD"),
     "express by table": (Model(), "EXPRESS"),
-    "dense": (Model(modes=(STANDARD_MODE, EXPRESS_MODE, DENSE_MODE)), "DENSE"),
+    "dense": (Model(baud=256000, modes=(STANDARD_MODE, EXPRESS_MODE, DENSE)), "DENSE"),
+    "ultra": (Model(modes=(STANDARD_MODE, EXPRESS_MODE, ULTRA_MODE)), "ULTRA"),
+    "ultra, fast": (Model(baud=256000, modes=(STANDARD_MODE, replace(ULTRA_MODE, sample_s=63e-6))), "ULTRA"),
     "standard only": (Model(modes=(STANDARD_MODE,)), "STANDARD"),
     "256000 baud": (Model(baud=256000), "EXPRESS"),
 }
 
 
-@pytest.mark.parametrize("name", MODELS)
+@pytest.mark.parametrize("name", UNITS)
 def test_it_scans_at_the_right_speed_in_the_best_mode(tmp_path, name):
-    model, mode = MODELS[name]
+    model, mode = UNITS[name]
     with Bench(tmp_path / "lidar", model) as bench:
         scan = bench.wait_scans(2)
         assert bench.driver.mode.answer.name == mode
@@ -140,7 +143,7 @@ def test_a_broken_unit_is_refused_with_its_code(tmp_path):
 
 def test_a_unit_at_no_speed_of_an_rplidar_is_refused(tmp_path):
     bench = Bench(tmp_path / "lidar", Model(baud=9600))
-    bench.unit.pwm, bench.unit.mode = 660, STANDARD_MODE  # it streams, so something is heard
+    bench.unit.begin(STANDARD_MODE, 660, time.monotonic())  # it streams, so something is heard
     with bench, pytest.raises(DeviceError, match="is no RPLIDAR"):
         bench.supervisor.wait_alive(5.0)
 
@@ -175,7 +178,7 @@ def test_unplugged_it_says_so_and_comes_back_by_itself(tmp_path):
 def test_a_unit_that_falls_silent_is_lost(tmp_path):
     with Bench(tmp_path / "lidar") as bench:
         bench.wait_scans(1)
-        bench.unit.pwm = 0
+        bench.unit.mode = None
         until_s = time.monotonic() + 2.0
         while bench.supervisor.alive:
             assert time.monotonic() < until_s
@@ -237,10 +240,11 @@ def test_the_motor_stops_on_sigterm_and_a_killed_program_does_not_spoil_the_next
         assert around(bench.wait_scans(1), 0) == pytest.approx(1.0, abs=0.02)
 
 
-@pytest.fixture(scope="module", params=["EXPRESS", "DENSE", "STANDARD"])
+@pytest.fixture(scope="module", params=["EXPRESS", "ULTRA", "DENSE", "STANDARD"])
 def scanning(request, tmp_path_factory):
-    modes = {"EXPRESS": EXPRESS_MODE, "DENSE": DENSE_MODE, "STANDARD": STANDARD_MODE}
-    with Bench(tmp_path_factory.mktemp("wire") / "lidar", Model(modes=(modes[request.param],))) as bench:
+    modes = {"EXPRESS": EXPRESS_MODE, "ULTRA": ULTRA_MODE, "DENSE": DENSE, "STANDARD": STANDARD_MODE}
+    model = Model(baud=256000, modes=(STANDARD_MODE, modes[request.param]))
+    with Bench(tmp_path_factory.mktemp("wire") / "lidar", model) as bench:
         bench.wait_scans(1)
         yield bench
 
