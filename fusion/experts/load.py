@@ -12,6 +12,7 @@ from lira.fusion.experts.files import SHIPPED, expert_path
 from lira.fusion.experts.tasks import DEFAULT
 from lira.fusion.methods.base import Alone, Expert, Method, Policy
 from lira.fusion.methods.doubt import Doubtful
+from lira.fusion.methods.shield import Shield, Shielded
 from lira.fusion.policies.checkpoint import Checkpoint, load_checkpoint
 from lira.fusion.policies.kernel_net import KernelNet
 from lira.fusion.policies.networks import Network
@@ -57,18 +58,24 @@ def load_policy(given: str | Expert | Policy, profile: RobotProfile, pair: str =
 
 
 def load_alone(
-    given: str | Expert | Policy, profile: RobotProfile, pair: str = DEFAULT, *, ask: bool = False
+    given: str | Expert | Policy,
+    profile: RobotProfile,
+    pair: str = DEFAULT,
+    *,
+    ask: bool = False,
+    shield: bool = False,
 ) -> Method:
-    """Load a policy to drive alone; with `ask` it stands and calls where it doubts.
+    """Load a policy to drive alone; with `ask` it stands and calls where it doubts, with `shield` behind a shield.
 
     Raises what `load_policy` raises, and `ConfigError` for one that cannot tell.
     """
     expert, network = _load(given, profile, pair)
-    if not ask:
-        return Alone(expert.name, expert.act)
-    if not isinstance(network, KernelNet):
-        raise ConfigError(f"'{given}' cannot tell what it does not know", "A novice taught by plus can.")
-    return Doubtful(expert.act, network.doubts)
+    alone: Method = Alone(expert.name, expert.act)
+    if ask:
+        if not isinstance(network, KernelNet):
+            raise ConfigError(f"'{given}' cannot tell what it does not know", "A novice taught by plus can.")
+        alone = Doubtful(expert.act, network.doubts)
+    return Shielded(alone, Shield(profile)) if shield else alone
 
 
 def _load(given: str | Expert | Policy, profile: RobotProfile, pair: str) -> tuple[Expert, Network | None]:

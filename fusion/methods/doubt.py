@@ -9,14 +9,16 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
+from lira.fusion.learning.kernel_novice import KernelNovice
 from lira.fusion.learning.novice import NetworkNovice, Novice
 from lira.fusion.methods.base import STAND, Call, Choice, Method, Policy, Proposal
 from lira.fusion.policies.ensemble import EnsembleNet
 from lira.fusion.preprocess import Features
+from lira.hal.errors import ConfigError
 from lira.hal.messages import FloatArray
 
-Ensemble = Callable[[Features], FloatArray]
-"""What each policy of an ensemble would do: float32 [b, 2]."""
+Doubt = Callable[[Features], float]
+"""d(O), in squared units of the action."""
 
 LAST = 0.25  # the share of the log that counts
 
@@ -33,26 +35,29 @@ def threshold(doubts: Sequence[float]) -> float:
     return float(np.mean(doubts[-math.ceil(LAST * len(doubts)) :]))
 
 
-def log_of(novice: Novice) -> "DoubtLog | None":
-    """Return an empty log of what a novice's ensemble thinks; None for a novice without one."""
+def doubt_of(novice: Novice) -> Doubt:
+    """Return how a novice doubts: by its ensemble, or as a kernel regression by its posterior variances.
+
+    Raises `ConfigError` for a novice that cannot.
+    """
+    if isinstance(novice, KernelNovice):
+        return lambda features: math.hypot(*(each**2 for each in novice.deviation(features)))
     network = novice.network if isinstance(novice, NetworkNovice) else None
-    return DoubtLog(network.opinions) if isinstance(network, EnsembleNet) else None
+    if not isinstance(network, EnsembleNet):
+        raise ConfigError("this novice cannot doubt", "Give it an ensemble, or the kernel novice.")
+    return lambda features: doubt(network.opinions(features))
 
 
 class DoubtLog:
-    """What the ensemble thought whenever the human took over."""
+    """How much the novice doubted whenever the human took over."""
 
-    def __init__(self, ensemble: Ensemble) -> None:
-        self._ensemble = ensemble
+    def __init__(self, doubt: Doubt) -> None:
+        self.doubt = doubt
         self.doubts: list[float] = []
 
     def take_over(self, features: Features) -> None:
         """Note the doubt at the moment of a take-over."""
         self.doubts.append(self.doubt(features))
-
-    def doubt(self, features: Features) -> float:
-        """d(O)."""
-        return doubt(self._ensemble(features))
 
     @property
     def threshold(self) -> float:

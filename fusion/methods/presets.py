@@ -13,13 +13,17 @@ import msgspec
 
 from lira.fusion.learning.novice import LearningSettings
 from lira.fusion.methods.base import Method
-from lira.fusion.methods.cloning import CloningSettings
 from lira.fusion.methods.context import Context, MethodSettings, Trunks
-from lira.fusion.methods.hg_dagger import HgDaggerSettings
 from lira.fusion.methods.lira import PRESETS, LiraSettings
 from lira.fusion.methods.plus import PlusSettings
+from lira.fusion.methods.rivals.cloning import CloningSettings
+from lira.fusion.methods.rivals.ensemble_dagger import EnsembleDaggerSettings
+from lira.fusion.methods.rivals.hg_dagger import HgDaggerSettings
+from lira.fusion.methods.rivals.intervention_weighted import InterventionWeightedSettings
+from lira.fusion.methods.rivals.lazy_dagger import LazyDaggerSettings
+from lira.fusion.methods.rivals.switching import SwitchingSettings
+from lira.fusion.methods.rivals.thrifty_dagger import ThriftyDaggerSettings
 from lira.fusion.methods.shared_feedback import SharingSettings
-from lira.fusion.methods.switching import SwitchingSettings
 from lira.fusion.methods.syllabus import FRESH, THESIS, Syllabus
 from lira.fusion.policies.kernel import KernelSettings
 from lira.hal.errors import ConfigError, PluginError
@@ -51,7 +55,16 @@ class OwnSettings(MethodSettings, frozen=True, tag="own"):
         return self.name
 
 
-Approach = LiraSettings | PlusSettings | HgDaggerSettings | CloningSettings | SwitchingSettings | OwnSettings
+Rival = (
+    HgDaggerSettings
+    | EnsembleDaggerSettings
+    | LazyDaggerSettings
+    | ThriftyDaggerSettings
+    | InterventionWeightedSettings
+    | CloningSettings
+    | SwitchingSettings
+)
+Approach = LiraSettings | PlusSettings | Rival | OwnSettings
 Sensor = Literal["camera", "lidar"]
 
 
@@ -109,41 +122,71 @@ def _plus(name: str, **changes: object) -> Preset:
     return msgspec.structs.replace(plus, **changes)
 
 
+def with_kernel(method: Preset) -> Preset:
+    """Return a method with everything of `plus` that is no part of a method: its novice, its layouts, its proof.
+
+    So what a method asks of the person is told apart from what the learner makes of it.
+    """
+    return _plus(f"{method.name}-kernel", approach=method.approach)
+
+
+def on_fresh_layouts(method: Preset) -> Preset:
+    """Return a method as it is, each training lap on a layout of its own."""
+    return msgspec.structs.replace(method, name=f"{method.name}-fresh", syllabus=FRESH)
+
+
+LIRA = (
+    Preset("hold", _HOLD),
+    Preset("thesis", PRESETS["thesis"]),
+    Preset("hold-fixed", _HOLD, sharing=SharingSettings(when="fixed")),
+    Preset("hold-flexible", _HOLD, sharing=SharingSettings(when="flexible")),
+    Preset("thesis-fixed", PRESETS["thesis"], sharing=SharingSettings(when="fixed")),
+    Preset("thesis-flexible", PRESETS["thesis"], sharing=SharingSettings(when="flexible")),
+    Preset("hold-scratch", _HOLD, trunks="scratch"),
+    Preset("hold-mirrored", _HOLD, mirrored=True),
+)
+PLUS = (
+    _plus("plus"),
+    _plus("plus-no-prefill", approach=PlusSettings(prefill=0)),
+    _plus("plus-no-reserve", approach=PlusSettings(reserve_s=0.0)),
+    _plus("plus-no-weight", learning=_M10),
+    _plus("plus-no-mirror", mirrored=False),
+    _plus("plus-no-handover", approach=PlusSettings(handover_s=0.0)),
+    _plus("plus-no-cleaning", kernel=KernelSettings(contradicts=None)),
+    _plus("plus-no-gain", kernel=KernelSettings(gain=1.0)),
+    _plus("plus-network", kernel=None),
+    _plus("plus-sure", approach=PlusSettings(sure=0.25)),
+    _plus("plus-ask", approach=PlusSettings(ask=True)),
+    _plus("plus-own", syllabus=THESIS),
+)
+# As their papers have them: a network of their own, which learns all it knows from the person.
+RIVALS = (
+    Preset("hg-dagger", _HG, trunks="scratch"),
+    Preset("ensemble-dagger", EnsembleDaggerSettings(), trunks="scratch"),
+    Preset("lazy-dagger", LazyDaggerSettings(), trunks="scratch"),
+    Preset("thrifty-dagger", ThriftyDaggerSettings(), trunks="scratch"),
+    Preset("iwr", InterventionWeightedSettings(), trunks="scratch"),
+    Preset("sirius", InterventionWeightedSettings(before_s=1.0), trunks="scratch"),
+    Preset("cloning", CloningSettings(), LearningSettings(filter_human=False), trunks="scratch"),
+)
+HG_DAGGER = (
+    Preset("hg-dagger-m10", _HG, _M10, trunks="scratch"),
+    Preset("hg-dagger-mirrored", _HG, trunks="scratch", mirrored=True),
+    Preset("hg-dagger-doubt", HgDaggerSettings(doubt=("unseen",)), trunks="scratch"),
+    Preset("hg-dagger-trunks", _HG),
+    Preset("hg-dagger-warm", _HG, warm=_BOTH),
+    Preset("hg-dagger-warm-m10", _HG, _M10, warm=_BOTH),
+    Preset("hg-dagger-warm-m10-mirrored", _HG, _M10, warm=_BOTH, mirrored=True),
+)
 METHODS = {
     method.name: method
     for method in (
-        Preset("hold", _HOLD),
-        Preset("thesis", PRESETS["thesis"]),
-        Preset("hold-fixed", _HOLD, sharing=SharingSettings(when="fixed")),
-        Preset("hold-flexible", _HOLD, sharing=SharingSettings(when="flexible")),
-        Preset("thesis-fixed", PRESETS["thesis"], sharing=SharingSettings(when="fixed")),
-        Preset("thesis-flexible", PRESETS["thesis"], sharing=SharingSettings(when="flexible")),
-        Preset("hold-scratch", _HOLD, trunks="scratch"),
-        Preset("hold-mirrored", _HOLD, mirrored=True),
-        _plus("plus"),
-        _plus("plus-no-prefill", approach=PlusSettings(prefill=0)),
-        _plus("plus-no-reserve", approach=PlusSettings(reserve_s=0.0)),
-        _plus("plus-no-weight", learning=_M10),
-        _plus("plus-no-mirror", mirrored=False),
-        _plus("plus-no-handover", approach=PlusSettings(handover_s=0.0)),
-        _plus("plus-no-cleaning", kernel=KernelSettings(contradicts=None)),
-        _plus("plus-no-gain", kernel=KernelSettings(gain=1.0)),
-        _plus("plus-network", kernel=None),
-        _plus("plus-sure", approach=PlusSettings(sure=0.25)),
-        _plus("plus-ask", approach=PlusSettings(ask=True)),
-        _plus("plus-own", syllabus=THESIS),
-        Preset("hg-dagger", _HG, trunks="scratch"),
-        Preset("hg-dagger-m10", _HG, _M10, trunks="scratch"),
-        Preset("hg-dagger-mirrored", _HG, trunks="scratch", mirrored=True),
-        Preset("hg-dagger-doubt", HgDaggerSettings(doubt=("unseen",)), trunks="scratch"),
-        Preset("hg-dagger-trunks", _HG),
-        Preset("hg-dagger-warm", _HG, warm=_BOTH),
-        Preset("hg-dagger-warm-m10", _HG, _M10, warm=_BOTH),
-        Preset("hg-dagger-warm-m10-mirrored", _HG, _M10, warm=_BOTH, mirrored=True),
-        Preset("hg-dagger-fresh", _HG, trunks="scratch", syllabus=FRESH),
-        Preset("hg-dagger-kernel", _HG, _HEAVY, mirrored=True, kernel=KernelSettings(), syllabus=FRESH),
-        Preset("hold-kernel", _HOLD, _HEAVY, mirrored=True, kernel=KernelSettings(), syllabus=FRESH),
-        Preset("cloning", CloningSettings(), LearningSettings(filter_human=False), trunks="scratch"),
+        *LIRA,
+        *PLUS,
+        *RIVALS,
+        *HG_DAGGER,
+        *map(on_fresh_layouts, (LIRA[0], *RIVALS)),
+        *map(with_kernel, (LIRA[0], *RIVALS)),
         Preset("switching", SwitchingSettings()),
     )
 }

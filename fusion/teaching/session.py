@@ -10,6 +10,7 @@ from lira.fusion.control import HELD, ControlLoop, Step, Teacher
 from lira.fusion.log.recorder import Journal
 from lira.fusion.log.run_log import LapRecord, ResultRecord
 from lira.fusion.methods.base import Alone, Call, Method
+from lira.fusion.methods.shield import DRIVER as SHIELD
 from lira.hal.errors import DeviceError
 from lira.hal.messages import CourseState, Episode
 from lira.hal.port import Arena, Robot
@@ -75,6 +76,7 @@ class Tally:
     lost: int = 0
     unfinished: int = 0
     stops: int = 0
+    shielded: int = 0
     lateral_m: list[float] = field(default_factory=list)
 
     @property
@@ -156,6 +158,7 @@ class Session:
             elapsed_s=self._journal.elapsed_s,
             account=ledger.account,
             proof=proof,
+            contradictions=() if self._apprentice is None else self._journal.contradictions(self._apprentice.novice),
         )
 
     @property
@@ -196,6 +199,7 @@ class Session:
             training_steps=self._training_steps,
             elapsed_s=self._journal.elapsed_s,
             stops=tally.stops,
+            shielded=tally.shielded,
         )
         self._journal.write(record)
         return record
@@ -223,6 +227,7 @@ class Session:
             )
             tally.steps += 1
             tally.human_steps += step.lesson.choice.driver == "human"
+            tally.shielded += step.proposal.choice.driver == SHIELD
             stands = phase != "train" and step.proposal.choice.call is Call.FEEDBACK
             tally.stops += stands and not stood
             stood = stands

@@ -1,7 +1,7 @@
 from taught import FEATURES, make_novice
 
 from lira.fusion.methods.base import Call
-from lira.fusion.methods.cloning import Cloning
+from lira.fusion.methods.rivals.cloning import Cloning
 
 FAR = (-1.0, 1.0)
 

@@ -10,7 +10,7 @@ from taught import FEATURES, make_novice
 from lira.fusion.learning.learner import Label, Learner
 from lira.fusion.methods.base import STAND, Call
 from lira.fusion.methods.doubt import Doubtful, DoubtLog, doubt, threshold
-from lira.fusion.methods.hg_dagger import HgDagger
+from lira.fusion.methods.rivals.hg_dagger import HgDagger
 from lira.fusion.policies.ensemble import EnsembleNet
 from lira.fusion.policies.networks import CameraNet, FusionNet, LidarNet
 
@@ -38,7 +38,7 @@ def test_the_threshold_is_the_mean_of_the_last_quarter(doubts, tau):
 def test_doubts_are_logged_once_per_take_over_and_only_when_there_was_something_to_doubt():
     novice, _ = make_novice(trained=False)
     spread = [0.0]
-    log = DoubtLog(lambda _: opinions(spread[0]))
+    log = DoubtLog(lambda _: doubt(opinions(spread[0])))
     method = HgDagger(novice, log)
 
     def drive(*humans):
@@ -59,7 +59,7 @@ def test_doubts_are_logged_once_per_take_over_and_only_when_there_was_something_
 
 def test_above_the_threshold_it_stands_and_asks_and_goes_on_when_it_is_sure():
     spread = [0.5]
-    log = DoubtLog(lambda _: opinions(spread[0]))
+    log = DoubtLog(lambda _: doubt(opinions(spread[0])))
     alone = Doubtful(lambda _: (0.9, 0.1), log.exceeds)
     assert alone.propose(FEATURES).choice.call is Call.NONE  # nobody ever took over
     log.take_over(FEATURES)

@@ -6,6 +6,7 @@ from lira.fusion.experts.load import as_expert, load_alone, load_network, load_p
 from lira.fusion.experts.tasks import DEFAULT, TASKS, task_of
 from lira.fusion.methods.base import Alone
 from lira.fusion.methods.doubt import Doubtful
+from lira.fusion.methods.shield import Shielded
 from lira.fusion.policies.checkpoint import Checkpoint, save_checkpoint
 from lira.fusion.policies.kernel_net import KernelNet
 from lira.fusion.policies.networks import CameraNet, FusionNet, LidarNet
@@ -133,3 +134,9 @@ def test_a_novice_of_plus_can(tmp_path):
     path = save(tmp_path / "novice.safetensors", "kernel", KernelNet(bins, filters), bins, filters, SIM.name)
     assert isinstance(load_alone(path, SIM, ask=True), Doubtful)
     assert isinstance(load_alone(path, SIM), Alone)
+
+
+def test_whatever_drives_alone_may_drive_behind_a_shield():
+    method = load_alone(lambda _: (1.0, 0.0), SIM, shield=True)
+    assert isinstance(method, Shielded)
+    assert method.propose(FEATURES).command == (1.0, 0.0)

@@ -3,7 +3,7 @@ import pytest
 
 from lira.fusion.learning.novice import LearningSettings, NetworkNovice
 from lira.fusion.methods.base import STAND, Call
-from lira.fusion.methods.hg_dagger import HgDagger
+from lira.fusion.methods.rivals.hg_dagger import HgDagger
 from lira.fusion.policies.networks import CameraNet
 from lira.fusion.preprocess import Features
 

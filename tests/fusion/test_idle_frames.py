@@ -5,8 +5,8 @@ import pytest
 
 from lira.fusion.learning.novice import LearningSettings, NetworkNovice
 from lira.fusion.methods.base import Expert
-from lira.fusion.methods.hg_dagger import HgDagger
 from lira.fusion.methods.lira import PRESETS, LiraSpf
+from lira.fusion.methods.rivals.hg_dagger import HgDagger
 from lira.fusion.policies.networks import CameraNet
 from lira.fusion.preprocess import Features
 

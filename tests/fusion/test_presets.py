@@ -1,9 +1,9 @@
 import msgspec
 import pytest
 
-from lira.fusion.methods.hg_dagger import HgDaggerSettings
 from lira.fusion.methods.lira import LiraSettings
-from lira.fusion.methods.presets import ALIASES, METHODS, Preset, method_named
+from lira.fusion.methods.presets import ALIASES, METHODS, RIVALS, Preset, method_named
+from lira.fusion.methods.rivals.hg_dagger import HgDaggerSettings
 from lira.fusion.methods.syllabus import FRESH
 from lira.hal.errors import ConfigError
 
@@ -33,17 +33,9 @@ def test_what_is_beyond_a_method_is_off_unless_its_name_says_so():
 
 
 def test_only_who_has_experts_begins_with_their_trunks():
-    frozen = {name for name, method in METHODS.items() if method.trunks == "frozen"}
-    alone = {
-        "hg-dagger",
-        "hg-dagger-fresh",
-        "hg-dagger-m10",
-        "hg-dagger-mirrored",
-        "hg-dagger-doubt",
-        "cloning",
-        "hold-scratch",
-    }
-    assert frozen == set(METHODS) - alone
+    alone = {"hg-dagger-m10", "hg-dagger-mirrored", "hg-dagger-doubt", "hold-scratch"}
+    alone |= {name for method in RIVALS for name in (method.name, f"{method.name}-fresh")}
+    assert {name for name, method in METHODS.items() if method.trunks == "frozen"} == set(METHODS) - alone
 
 
 def test_only_plus_and_what_is_named_so_is_taught_and_proven_on_fresh_layouts():
@@ -56,6 +48,14 @@ def test_who_learns_by_a_kernel_says_so_and_sees_as_the_experts_do():
     named = {name for name in METHODS if name.startswith("plus") or name.endswith("-kernel")} - {"plus-network"}
     assert {name for name, method in METHODS.items() if method.kernel is not None} == named
     assert all(METHODS[name].trunks == "frozen" and not METHODS[name].warm for name in named)
+
+
+def test_every_rival_is_there_on_fresh_layouts_and_with_all_of_plus_but_its_method():
+    for rival in (METHODS["hold"], *RIVALS):
+        fresh, kernel = METHODS[f"{rival.name}-fresh"], METHODS[f"{rival.name}-kernel"]
+        assert msgspec.structs.replace(fresh, name=rival.name, syllabus=rival.syllabus) == rival
+        plus = msgspec.structs.replace(METHODS["plus"], name=kernel.name, approach=rival.approach)
+        assert kernel == plus
 
 
 def test_an_unknown_name_lists_the_known_ones():

@@ -4,7 +4,7 @@ import numpy as np
 from taught import FEATURES
 
 from lira.fusion.methods.base import Call, Expert
-from lira.fusion.methods.switching import Switching, SwitchingSettings
+from lira.fusion.methods.rivals.switching import Switching, SwitchingSettings
 
 CAMERA, LIDAR = (1.0, 0.1), (0.5, -0.8)
 

@@ -2,8 +2,8 @@
 
 import msgspec
 
-from lira.fusion.methods.hg_dagger import HgDaggerSettings
 from lira.fusion.methods.lira import PRESETS
+from lira.fusion.methods.rivals.hg_dagger import HgDaggerSettings
 from lira.fusion.teaching.teacher import PERFECT
 from lira.tools.experiments.trial import Preset, Trial
 

@@ -190,7 +190,7 @@ def test_the_fingerprint_covers_what_a_trial_runs_and_nothing_beside_it():
     names = {str(path.relative_to(fingerprints.ROOT)) for path in sources(fingerprints.START)}
     assert {
         "fusion/methods/lira.py",
-        "fusion/methods/hg_dagger.py",
+        "fusion/methods/rivals/hg_dagger.py",
         "fusion/teaching/teacher.py",
         "sim_backend/twin.py",
     } <= names

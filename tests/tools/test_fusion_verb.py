@@ -210,7 +210,6 @@ def test_the_demo_names_a_folder_that_cannot_be_made(refused, tmp_path):
     [
         ("torch", "learn", ["fusion", "--policy", "camera-expert"]),
         ("torch", "learn", ["demo"]),
-        ("pybullet", "sim", ["demo"]),
     ],
 )
 def test_a_missing_extra_says_what_to_install(package, extra, words, tmp_path):

@@ -3,20 +3,25 @@
 import pytest
 from short_trials import write_world
 
-from lira.fusion.methods.presets import METHODS
+from lira.fusion.methods.presets import METHODS, Preset
+from lira.fusion.methods.rivals.ensemble_dagger import EnsembleDaggerSettings
+from lira.fusion.policies.kernel import KernelSettings
 from lira.fusion.teaching.teacher import PERFECT
 from lira.tools.experiments.trial import Trial, play
 
 KINDS = (
     *("hold-fixed", "hold-scratch", "hold-mirrored", "hg-dagger-warm", "hg-dagger-doubt", "cloning", "switching"),
     *("plus", "plus-ask", "hg-dagger-kernel"),
+    *("ensemble-dagger", "lazy-dagger-kernel", "thrifty-dagger-kernel", "iwr-kernel"),
 )
+ASKING = Preset("asking", EnsembleDaggerSettings(chi=1e-4), kernel=KernelSettings())  # it doubts nearly everywhere
 
 
 @pytest.fixture(scope="module")
 def outcomes(tmp_path_factory):
     world = write_world(tmp_path_factory.mktemp("world"))
     trials = {name: Trial(METHODS[name], world, 0, "perfect", PERFECT, laps=1, unseen=1) for name in KINDS}
+    trials["asking"] = Trial(ASKING, world, 0, laps=2, all_laps=True, unseen=1)  # a hand that takes a moment
     return {name: play(trial) for name, trial in trials.items()}
 
 
@@ -27,7 +32,7 @@ def test_all_of_them_end_with_laps_and_a_result(outcomes):
         if name != "switching":
             assert phases[0] == "train", name
             assert outcome.result.buffer > 0, name
-            assert outcome.result.laps == 1, name
+            assert outcome.result.laps == outcome.trial.laps, name
 
 
 def test_by_the_switching_rule_nobody_learns_and_both_experts_drive(outcomes):
@@ -63,3 +68,16 @@ def test_plus_is_proven_on_layouts_that_it_was_not_taught(outcomes):
         phase: {lap.layout for lap in outcomes["plus"].laps if lap.phase == phase} for phase in ("train", "prove")
     }
     assert not layouts["train"] & layouts["prove"]
+
+
+def test_a_robot_that_asks_is_answered_and_the_answers_are_learned(outcomes):
+    result = outcomes["asking"].result
+    assert result.calls > 0
+    assert result.account.called_for > 0
+    assert result.human_labels > 0
+    assert sum(lap.collisions + lap.lost for lap in outcomes["asking"].laps if lap.phase == "train") == 0
+
+
+def test_what_was_left_alone_is_learned_beside_what_the_human_did(outcomes):
+    assert set(outcomes["iwr-kernel"].labels) <= {"demonstration", "human"}  # the robot's own are nobody's labels
+    assert outcomes["iwr-kernel"].result.training_steps >= outcomes["iwr-kernel"].result.buffer

@@ -38,6 +38,16 @@ def test_the_robot_stands_when_nobody_asks_for_more():
         assert speed_m_s(robot) == 0.0
 
 
+@pytest.mark.parametrize("shield", [False, True])
+def test_behind_a_shield_one_that_sees_nothing_hits_nothing(shield):
+    with lira.simulate("forest", renderer="tiny") as robot:
+        steps = list(lira.drive(robot, lambda _: (1.0, 0.0), steps=40, shield=shield))
+    changed = [step for step in steps if step.proposal.choice.driver == "shield"]
+    assert bool(changed) is shield
+    assert any(step.state.collided for step in steps) is not shield
+    assert all(step.proposal.novice == (1.0, 0.0) for step in steps)
+
+
 def test_a_robot_without_a_governor_is_refused_before_it_moves():
     with pytest.raises(lira.LiraError, match=r"a NullRobot has no governor.*lira\.govern"):
         lira.drive(NullRobot(PROFILE), ahead)

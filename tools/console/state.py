@@ -119,6 +119,9 @@ def policy_words(decision: Decision | None) -> tuple[str, str]:
     """Which policy drives, and why it is that one."""
     if decision is None:
         return "POLICY", "it does not say how it decides"
+    if decision.driver == "shield":
+        stands = decision.call == "feedback"
+        return "SHIELD", "no turn is clear: it stands and asks you" if stands else "the novice would touch something"
     if decision.call == "feedback":
         return decision.driver.upper(), "experts disagree: it drives slowly and asks you"
     if decision.driver == "novice":

@@ -16,7 +16,7 @@ from lira.fusion.teaching.teacher import SKILLED, TeacherSettings
 from lira.hal.messages import Action
 from lira.hal.profile import RobotProfile, load_profile
 from lira.sim_backend.catalogue import load_world
-from lira.sim_backend.foresight import sketching
+from lira.sim_backend.foresight import with_small_camera
 from lira.tools.experiments.notes import Notes, Track
 from lira.tools.runs.build import build_method, teacher
 from lira.tools.runs.course import Course, run_course
@@ -97,7 +97,7 @@ def play(trial: Trial) -> Outcome:
         unseen=range(first, first + trial.unseen),
     )
     with (
-        simulate(world, sketching(profile), layout=trial.seed, seed=trial.seed, renderer="tiny") as robot,
+        simulate(world, with_small_camera(profile), layout=trial.seed, seed=trial.seed, renderer="sketch") as robot,
         closing(build_method(trial.method, profile, trial.seed, InlineTrainer, trial.pair)) as method,
         closing(teacher(trial.skill, profile, world, trial.seed, trial.seed)) as hand,
     ):

@@ -8,6 +8,7 @@ from lira.fusion.control import ControlLoop, Teacher
 from lira.fusion.log.recorder import Journal
 from lira.fusion.log.run_log import ResultRecord
 from lira.fusion.methods.base import Method
+from lira.fusion.methods.shield import Shield, Shielded
 from lira.fusion.methods.syllabus import THESIS, Syllabus
 from lira.fusion.teaching.session import Drive, Session
 from lira.hal.port import Arena, Robot
@@ -21,7 +22,8 @@ class Course:
     """The laps of a run in one world: what is taught, what has to be proven, and what is shown afterwards.
 
     `layout` is the run's own one, from which the syllabus derives those of its laps. At most so many `laps` are taught;
-    with `all_laps` the teaching goes on after the novice was proven. `unseen` are the layouts shown afterwards.
+    with `all_laps` the teaching goes on after the novice was proven. `unseen` are the layouts shown afterwards, with
+    `shield` behind a shield; what is proven is proven without.
     """
 
     profile: RobotProfile
@@ -31,6 +33,7 @@ class Course:
     laps: int = 12
     all_laps: bool = False
     unseen: Sequence[int] = ()
+    shield: bool = False
 
     @property
     def spare(self) -> int:
@@ -68,7 +71,12 @@ def run_course(
     has its proving runs at once.
     """
     loop = ControlLoop(robot, truth=arena.state)
-    session = Session(robot, arena, loop, journal, method if method.learns else None, method.alone)
+
+    def alone(phase: str) -> Method:
+        driver = method.alone(phase)
+        return Shielded(driver, Shield(course.profile)) if course.shield and phase == "unseen" else driver
+
+    session = Session(robot, arena, loop, journal, method if method.learns else None, alone)
     loop.arm()
     if method.learns:
         with saving or nullcontext():

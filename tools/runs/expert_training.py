@@ -16,7 +16,7 @@ from lira.fusion.learning.novice import LearningSettings, NetworkNovice
 from lira.fusion.learning.trainer import InlineTrainer
 from lira.fusion.log.recorder import Journal
 from lira.fusion.methods.base import Alone
-from lira.fusion.methods.hg_dagger import HgDagger
+from lira.fusion.methods.rivals.hg_dagger import HgDagger
 from lira.fusion.policies.checkpoint import Checkpoint, save_checkpoint
 from lira.fusion.policies.networks import CameraNet, LidarNet, Network
 from lira.fusion.teaching.curriculum import Curriculum, curriculum
@@ -26,7 +26,7 @@ from lira.hal.errors import LiraError
 from lira.hal.messages import Action
 from lira.hal.profile import RobotProfile, load_profile
 from lira.sim_backend.catalogue import load_world
-from lira.sim_backend.foresight import Foresight, sketching
+from lira.sim_backend.foresight import Foresight, with_small_camera
 from lira.tools.runs.simulated import simulate
 from lira.tools.runs.teach import telling
 
@@ -38,13 +38,13 @@ def train_expert(kind: Sensor, task: str, profile: RobotProfile, seed: int, path
     torch.set_num_threads(1)
     course = curriculum(kind, task)
     world = load_world(course.world)
-    profile = blindfolded(profile) if kind == "lidar" else sketching(profile)
+    profile = blindfolded(profile) if kind == "lidar" else with_small_camera(profile)
     shape = profile.features
     network: Network
     network = CameraNet(shape.filters, seed=seed) if kind == "camera" else LidarNet(shape.bins, seed=seed)
     novice = NetworkNovice(network, InlineTrainer(Learner(network, seed=seed, frozen_trunks=False)), LearningSettings())
     with (
-        simulate(world, profile, seed=seed) as robot,
+        simulate(world, profile, seed=seed, renderer="sketch") as robot,
         closing(ScriptedTeacher(Foresight(profile, world), profile, course.teacher, seed)) as teacher,
     ):
         loop = ControlLoop(robot, truth=robot.arena.state)

@@ -34,7 +34,9 @@ def teach(args: argparse.Namespace, plan: Plan, robot: RemoteRobot, publish: Pub
 def examine(args: argparse.Namespace, robot: RemoteRobot, publish: Publish, say: Say) -> int:
     """Let a policy drive the layouts after `args.layout`; it goes on behind a crash. Returns 1 if any failed."""
     with arena_of(args, robot) as (arena, world):
-        policy = load_alone(args.policy, robot.profile, args.experts or task_of(world.name), ask=args.ask)
+        policy = load_alone(
+            args.policy, robot.profile, args.experts or task_of(world.name), ask=args.ask, shield=args.shield
+        )
         journal = Journal(write=telling(say), publish=publish)
         unseen = range(args.layout + 1, args.layout + 1 + args.unseen)
         course = Course(robot.profile, world, unseen=unseen)

@@ -94,6 +94,8 @@ def lap_line(lap: LapRecord) -> str:
     words += f"  collisions {lap.collisions}, lost {lap.lost}"
     if lap.stops:
         words += f", stops to ask {lap.stops}"
+    if lap.shielded:
+        words += f", turns changed by the shield {lap.shielded}"
     if lap.phase == "train":
         words += f"  human labels {lap.human_labels}, interventions {lap.interventions}, calls {lap.calls},"
         words += f" buffer {lap.buffer}, training steps {lap.training_steps}"

@@ -13,6 +13,7 @@ from lira.fusion.learning.trainer import InlineTrainer
 from lira.fusion.methods.base import Expert, Method, Policy
 from lira.fusion.methods.context import Context, MethodSettings
 from lira.fusion.methods.presets import OwnSettings, Preset, method_named
+from lira.fusion.methods.shield import Shield, Shielded
 from lira.hal.client.remote import RemoteRobot
 from lira.hal.errors import ConfigError
 from lira.hal.messages import STOP, Command
@@ -29,18 +30,22 @@ def drive(
     *,
     steps: int | None = None,
     experts: str = DEFAULT,
+    shield: bool = False,
 ) -> Iterator[Step]:
     """Let a policy or a method drive an open robot, and yield each decision; a human may take over at any time.
 
     `policy` is a name, a function of `Features`, an `Expert` or a `Method`, which goes on learning. It ends after so
     many decisions, or when you stop asking for more; then the robot stands. A decision for which a sensor was missing
-    is not yielded. Raises `ConfigError` for a robot without a governor: open it with `simulate`, `govern` or `connect`.
+    is not yielded. With `shield` a turn that would touch what the lidar sees gives way to one that does not. Raises
+    `ConfigError` for a robot without a governor: open it with `simulate`, `govern` or `connect`.
     """
     if not isinstance(robot, GovernedRobot | RemoteRobot):
         what = f"a {type(robot).__name__} has no governor that would stop it"
         raise ConfigError(what, "Open it with lira.govern, or reach it over the bus with lira.connect.")
     if not isinstance(policy, Method):
         policy = load_alone(policy, robot.profile, experts)
+    if shield:
+        policy = Shielded(policy, Shield(robot.profile))
     return _steps(robot, policy, steps)
 
 

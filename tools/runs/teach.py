@@ -37,7 +37,7 @@ class Plan:
     """What is to be taught, and how. `pair` says whose experts (those of the world's task), `more` adds own ones.
 
     `build` builds the method where the preset's name does not say how. `folder` keeps labels, record and novice;
-    `command` repeats the run.
+    `command` repeats the run. `shield` is for the unseen layouts, and for what drives afterwards.
     """
 
     preset: Preset
@@ -51,6 +51,7 @@ class Plan:
     build: Callable[[Context], Method] | None = None
     folder: Path | None = None
     command: str = ""
+    shield: bool = False
 
     def head(self, profile: RobotProfile, world: str) -> RunRecord:
         """Return the head of the run's record."""
@@ -113,7 +114,7 @@ def teach_on(
         note(head)
         kept = None if folder is None else saving(lambda: snapshot(folder, method.novice, profile, head), say)
         unseen = range(plan.layout + 1, plan.layout + 1 + plan.unseen)
-        course = Course(profile, world, plan.layout, plan.preset.syllabus, plan.laps, unseen=unseen)
+        course = Course(profile, world, plan.layout, plan.preset.syllabus, plan.laps, unseen=unseen, shield=plan.shield)
         journal = Journal(keep=keep, write=note, publish=publish)
         result = run_course(robot, arena, method, hand, journal, course, kept)
         note(result)

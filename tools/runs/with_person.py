@@ -27,7 +27,9 @@ from lira.tools.runs.teach import Plan, Publish, Say
 
 def show_policy(args: argparse.Namespace, robot: RemoteRobot, publish: Publish, say: Say) -> int:
     """Let one policy drive until Ctrl-C."""
-    method = load_alone(args.policy, robot.profile, args.experts or task_of(world_of(robot)), ask=args.ask)
+    method = load_alone(
+        args.policy, robot.profile, args.experts or task_of(world_of(robot)), ask=args.ask, shield=args.shield
+    )
     journal, loop = Journal(publish=publish), ControlLoop(robot)
     with stop_or_interrupt() as stop, request_line(robot, args) as line:
         service = OperatorService(line, loop, method, journal, say, restart=restarter(robot, args))

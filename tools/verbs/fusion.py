@@ -58,6 +58,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="with --policy: a novice of plus stands and calls where it knows less than in the runs that proved it",
     )
     add(
+        "--shield",
+        action="store_true",
+        help="what drives alone (--policy, --unseen): a turn that would touch what the lidar sees gives way to the "
+        "nearest one that does not",
+    )
+    add(
         "--experts",
         metavar="PAIR",
         help=f"whose experts: a task ({', '.join(TASKS)}), TASK@SEED, or a folder with camera.safetensors and "
@@ -177,6 +183,7 @@ def plan_of(args: argparse.Namespace) -> "Plan":
         pair=args.experts,
         more=args.expert,
         folder=args.run or Path("runs") / file_name(args.method),
+        shield=args.shield,
         command=args.as_command or shlex.join(["lira", *sys.argv[1:]]),
     )
 

@@ -32,6 +32,7 @@ if TYPE_CHECKING:
 
 LOOK_S = 0.2
 STATUS_S = 10.0
+DRAWN = {"sketch": "sketched without pybullet", "tiny": "drawn by pybullet", "egl": "drawn by pybullet with OpenGL"}
 ECHOES = 0.5  # of the directions ahead: with less the learner refuses the scan
 
 
@@ -66,9 +67,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     add(
         "--renderer",
-        choices=("auto", "tiny", "egl"),
+        choices=("auto", "sketch", "tiny", "egl"),
         default="auto",
-        help="what draws the camera's picture: tiny runs anywhere, egl needs OpenGL (default: %(default)s)",
+        help="what draws and measures the world: sketch runs anywhere, tiny and egl are pybullet's; auto is pybullet "
+        "where it is installed (default: %(default)s)",
     )
 
 
@@ -93,7 +95,7 @@ def run(args: argparse.Namespace) -> int:
     pace = "lockstep" if args.lockstep else "real time" if factor == 1.0 else f"{factor:g} times real time"
 
     def ready(bus: "Bus", stop: threading.Event) -> None:
-        where = f"world '{world.name}' ({profile.name}) on {args.listen}"
+        where = f"world '{world.name}' ({profile.name}, {DRAWN[twin.renderer]}) on {args.listen}"
         where += ", encrypted" if bus.encrypted else ", open to anybody there" if args.insecure else ""
         print(f"twin '{args.name}' serves {where}, {pace}; stop with Ctrl-C", flush=True)
         if not args.lockstep:  # there the driver tells how it goes

@@ -34,7 +34,7 @@ def alone(name: Sensor, trial: Trial) -> tuple[LapRecord, Track]:
     """Drive the passage with one expert and nobody to help, as far as it comes."""
     expert = load_policy(f"{name}-expert", trial.profile, trial.pair)
     notes, method = Notes(), Alone(name, expert.act)
-    with simulate(trial.world, trial.profile, renderer="tiny") as robot:
+    with simulate(trial.world, trial.profile, renderer="sketch") as robot:
         course = Course(trial.profile, robot.arena.world)
         run_course(robot, robot.arena, method, None, Journal(write=notes.record), course)
     return notes.laps[0], notes.tracks[0]

@@ -1,6 +1,6 @@
 """HG-DAgger (Kelly et al., 2019): the human gates, and only what the human drives is learned.
 
-At test time the novice may doubt: `fusion/doubt.py`.
+At test time the novice may doubt: `fusion/methods/doubt.py`.
 """
 
 from typing import Literal
@@ -8,7 +8,7 @@ from typing import Literal
 from lira.fusion.learning.novice import Novice
 from lira.fusion.methods.base import STAND, Call, Choice, Lesson, Method, Proposal
 from lira.fusion.methods.context import Context, MethodSettings
-from lira.fusion.methods.doubt import Doubtful, DoubtLog, log_of
+from lira.fusion.methods.doubt import Doubtful, DoubtLog, doubt_of
 from lira.fusion.preprocess import Features
 from lira.hal.messages import Action
 
@@ -25,7 +25,7 @@ class HgDaggerSettings(MethodSettings, frozen=True, tag="hg-dagger"):
     def build(self, context: Context) -> Method:
         """Teach a novice, with an ensemble if it is to doubt."""
         novice = context.novice(ensemble=self.ensemble if self.doubt else 0)
-        return HgDagger(novice, log_of(novice), self.doubt)
+        return HgDagger(novice, DoubtLog(doubt_of(novice)) if self.doubt else None, self.doubt)
 
 
 class HgDagger(Method):
