@@ -37,7 +37,7 @@ class BaseSettings(Table, frozen=True):
 
     distance_scale: Scale = 1.0
     turn_scale: Scale = 1.0
-    spin_slip_m_rad: float = 0.0
+    spin_slip_m_rad: float = -0.0114  # by the firmware's own arithmetic
     boot_s: Seconds = 2.0  # after the line is opened
 
 
