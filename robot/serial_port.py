@@ -9,6 +9,7 @@ from pathlib import Path
 import serial
 
 from lira.hal.errors import DeviceError
+from lira.robot.port_users import other_users
 
 READ_SIZE = 4096
 FLUSHES = 64
@@ -38,6 +39,10 @@ class Line:
             raise _why_not(url, error) from error
         self.has_baud = "://" not in url
         self.baud = baud
+        users = other_users(url) if self.has_baud else []
+        if users:
+            self.close()
+            raise DeviceError(f"{url} is in use by {', '.join(users)}", "Stop that program first.")
 
     def fileno(self) -> int:
         """Its descriptor, for another process to share. Raises `DeviceError` for a line that has none."""

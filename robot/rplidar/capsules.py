@@ -32,14 +32,14 @@ NEAREST_M = 0.05
 class Layout:
     """One answer type. `read`: bodies [n, m] become metres and degrees behind the head [n, points].
 
-    `ahead`: the last point of a body is only known with the next one; the last row's is nan.
+    `ahead`: so many points at the end of a body are only known with the next one; in the last row they are nan.
     """
 
     size: int
     points: int
     read: Callable[[Bytes], tuple[Floats, Floats]]
     back_rad: float
-    ahead: bool = False
+    ahead: int = 0
 
 
 class CapsuleDecoder:
@@ -53,7 +53,7 @@ class CapsuleDecoder:
         self._spans_deg: deque[float] = deque(maxlen=SPANS)
         self._buffer = b""
         self._start_deg = np.nan  # of the newest capsule
-        self._newest: tuple[Bytes, float] | None = None  # its bytes and span, if its last point is still to come
+        self._newest: tuple[Bytes, float] | None = None  # its bytes and span, if its last points are still to come
 
     @property
     def left(self) -> int:
@@ -64,7 +64,7 @@ class CapsuleDecoder:
         """Take what came, and return the points that it completes."""
         self._buffer += data
         if len(self._buffer) < self.size:
-            return Points(NOTHING, NOTHING, waiting=int(self._newest is not None))
+            return Points(NOTHING, NOTHING, waiting=self._waiting)
         stream = np.frombuffer(self._buffer, np.uint8)
         pieces: list[tuple[Floats, Floats]] = [(NOTHING, NOTHING)]
         at = lost = 0
@@ -83,7 +83,11 @@ class CapsuleDecoder:
                 at += skip
         self._buffer = self._buffer[at:]
         theta_rad, distance_m = (np.concatenate(parts) for parts in zip(*pieces, strict=True))
-        return Points(theta_rad, distance_m, lost, int(self._newest is not None))
+        return Points(theta_rad, distance_m, lost, self._waiting)
+
+    @property
+    def _waiting(self) -> int:
+        return 0 if self._newest is None else self._layout.ahead
 
     def _find(self, data: Bytes) -> int:
         """Count the bytes, at least one, before the first place where a capsule may begin, complete or not."""
@@ -115,15 +119,15 @@ class CapsuleDecoder:
         count, ahead = self._layout.points, self._layout.ahead
         wanted = np.repeat(follows[:, None], count, axis=1)
         if ahead:
-            # The newest capsule's last point comes with the next one, if that follows it.
-            wanted[:-1, -1] &= follows[1:]
-            wanted[-1, -1] = False
+            # The newest capsule's last points come with the next one, if that follows it.
+            wanted[:-1, -ahead:] &= follows[1:, None]
+            wanted[-1, -ahead:] = False
             if self._newest is not None:
                 before, before_deg = self._newest
                 run = np.concatenate([before[None], run])
                 first_deg = (int(before[2]) | int(before[3]) << 8) % 0x8000 / 64.0
                 start_deg, span_deg = np.append(first_deg, start_deg), np.append(before_deg, span_deg)
-                wanted = np.concatenate([[[*[False] * (count - 1), follows[0]]], wanted])
+                wanted = np.concatenate([[[*[False] * (count - ahead), *[follows[0]] * ahead]], wanted])
             self._newest = (run[-1].copy(), float(span_deg[-1])) if follows[-1] else None
         distance_m, behind_deg = self._layout.read(run[:, HEAD_SIZE:])
         theta_deg = start_deg[:, None] + np.nan_to_num(span_deg)[:, None] * (np.arange(count) / count) - behind_deg
@@ -157,7 +161,7 @@ def read_dense(bodies: Bytes) -> tuple[Floats, Floats]:
 def read_ultra(bodies: Bytes) -> tuple[Floats, Floats]:
     """32 cabins of three points: a scaled distance of 12 bits, and how the second and the third differ, 10 bits each.
 
-    The second differs from the first, the third from the one after it, at that one's scale.
+    The second differs from the first, or from the one after it if the first is none, the third from the one after it.
     """
     words = np.ascontiguousarray(bodies).view("<u4").astype(np.int64)
     majors = np.append((words & 0xFFF).reshape(-1), 0)
@@ -169,7 +173,7 @@ def read_ultra(bodies: Bytes) -> tuple[Floats, Floats]:
     one = _differ(words >> 12, np.where(blank, after, here), np.where(blank, after_level, here_level))
     two = _differ(words >> 22, after, after_level)
     distance_m = np.stack([here.astype(np.float64), one, two], axis=-1).reshape(len(bodies), ULTRA.points) / 1000.0
-    distance_m[-1, -1] = np.nan
+    distance_m[-1, -ULTRA.ahead :] = np.nan
     far_deg = FAR_DEG - NEAR_M_DEG / np.maximum(distance_m, NEAREST_M)
     return distance_m, np.where(distance_m >= NEAREST_M, far_deg, BLANK_DEG)
 
@@ -182,5 +186,5 @@ def _differ(bits: NDArray[np.int64], base_mm: NDArray[np.int64], level: NDArray[
 
 
 EXPRESS = Layout(84, 32, read_express, CORRECTION_RAD)
-ULTRA = Layout(132, 96, read_ultra, CORRECTION_RAD, ahead=True)
+ULTRA = Layout(132, 96, read_ultra, CORRECTION_RAD, ahead=2)
 DENSE = Layout(84, 40, read_dense, 0.0)

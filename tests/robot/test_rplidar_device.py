@@ -21,6 +21,7 @@ from lira.sim_backend.emulators.rplidar import RplidarUnit, descriptor
 from lira.sim_backend.emulators.rplidar_models import (
     DENSE_MODE,
     EXPRESS_MODE,
+    MODELS,
     STANDARD_MODE,
     ULTRA_MODE,
     Model,
@@ -184,6 +185,56 @@ def test_a_unit_that_falls_silent_is_lost(tmp_path):
             assert time.monotonic() < until_s
             time.sleep(0.01)
         assert "fell silent" in str(bench.supervisor.failure)
+
+
+def test_a_motor_that_needs_longer_than_its_time_is_waited_for(tmp_path):
+    with Bench(tmp_path / "lidar", Model(spin_up_s=3.0)) as bench:
+        bench.wait_scans(1, 9.0)
+        assert (bench.supervisor.sessions, bench.supervisor.failure) == (1, None)
+
+
+def test_a_unit_that_ends_its_scan_when_its_motor_is_told_goes_on(tmp_path):
+    with Bench(tmp_path / "lidar", Model(hz_at_660=11.5, pwm_ends_scan=True)) as bench:
+        until_s = time.monotonic() + 15.0
+        while bench.unit.pwm in (0, 660):
+            assert time.monotonic() < until_s, bench.supervisor.failure
+            time.sleep(0.01)
+        bench.wait_scans(5)
+        assert bench.supervisor.losses == 0
+        assert bench.driver.diagnostics().values
+
+
+def test_noise_is_no_scan_and_the_head_turns_on_meanwhile(tmp_path):
+    with Bench(tmp_path / "lidar") as bench:
+        bench.wait_scans(1)
+        sound = bench.unit.emit
+        bench.unit.emit = lambda now_s: bytes(len(sound(now_s)))
+        until_s = time.monotonic() + 8.0
+        while bench.supervisor.alive:
+            assert time.monotonic() < until_s
+            time.sleep(0.01)
+        assert "sends nothing that is a scan" in str(bench.supervisor.failure)
+        assert bench.unit.pwm > 0
+        bench.unit.emit = sound
+        bench.wait_scans(1, 12.0)
+        bench.unit.emit = lambda now_s: bytes(len(sound(now_s)))
+        while bench.supervisor.alive:
+            time.sleep(0.01)
+        bench.unit.emit = sound
+    assert bench.unit.pwm == 0  # closed between two tries
+
+
+def test_a_warning_and_what_it_does_is_told(tmp_path):
+    with Bench(tmp_path / "lidar", replace(MODELS["a2m8-1.29"], warning=0x0042, spin_up_s=0.0)) as bench:
+        bench.wait_scans(3)
+        told = bench.driver.diagnostics()
+    assert told.level == 1
+    assert "0x0042" in told.message
+    values = dict(told.values)
+    assert values["firmware"] == "1.29"
+    assert values["mode"] == "Sensitivity (0x84)"
+    assert float(values["samples/s"]) == pytest.approx(7874, rel=0.1)
+    assert values["bytes lost"] == "0"
 
 
 def test_what_is_missing_or_no_lidar_is_named(tmp_path):
