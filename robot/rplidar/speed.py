@@ -55,21 +55,23 @@ class TurnWatchdog:
         self._url = url
         self._turns = 0
         self._turned_s = self._heard_s = now_s
-        self._points = 0
+        self._points, self._pointed_s = 0, now_s
 
     def look(self, now_s: float, *, heard: bool, points: int, turns: int, swept_rad: float) -> None:
         """Raise `DeviceError` for one that is lost. `points` and `turns` have come, the head went `swept_rad` since."""
         if heard:
             self._heard_s = now_s
+        if points > self._points:
+            self._points, self._pointed_s = points, now_s
         if turns > self._turns:
-            self._turns, self._turned_s, self._points = turns, now_s, points
+            self._turns, self._turned_s = turns, now_s
         patience_s = TURN_S if self._turns else FIRST_TURN_S
         silent_s, without_s = now_s - self._heard_s, now_s - self._turned_s
         if silent_s > (SILENCE_S if self._turns else FIRST_TURN_S):
             raise DeviceError(f"the lidar at {self._url} {self._silence()}", f"{MOTOR} Check its cable, too.")
         if without_s <= patience_s:
             return
-        if points - self._points < 1:
+        if now_s - self._pointed_s > SILENCE_S:
             raise DeviceError(f"the lidar at {self._url} sends nothing that is a scan", CABLE)
         hz = swept_rad / math.tau / without_s
         raise DeviceError(f"the head of the lidar at {self._url} turns at {hz:.1f} Hz only, if at all", MOTOR)

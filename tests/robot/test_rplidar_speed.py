@@ -116,6 +116,6 @@ def test_a_head_may_take_ten_seconds_to_begin():
 def test_bytes_without_turns_are_a_loss_and_why_is_said(told, words):
     watchdog = TurnWatchdog("lidar", 0.0)
     look(watchdog, 2.0, points=400, turns=1)
-    look(watchdog, 2.4, turns=1, **told)
+    look(watchdog, 2.4, points=650 if "swept_rad" in told else 400, turns=1, heard=told.get("heard", True))
     with pytest.raises(DeviceError, match=words):
         look(watchdog, 3.05, turns=1, **told)
