@@ -94,9 +94,10 @@ class Sensors:
         """A picture, encoded as the profile wants it to travel."""
         camera = self._profile.camera
         picture = add_noise(self._camera.render(_pose(motion)), camera.noise_gray, self._camera_rng)
+        colours = np.asarray(cv2.cvtColor(picture, cv2.COLOR_GRAY2BGR), dtype=np.uint8)
         if camera.encoding == "jpeg":
-            return CompressedImage(now_s, fit_jpeg(cv2.cvtColor(picture, cv2.COLOR_GRAY2BGR)))
-        return Image(now_s, np.repeat(picture[..., None], 3, axis=-1))
+            return CompressedImage(now_s, fit_jpeg(colours))
+        return Image(now_s, colours)
 
     def close(self) -> None:
         """Let go of the scene. May be called twice."""

@@ -47,6 +47,7 @@ VERBS = {
         "lira.tools.verbs.stop_test", "break things while a robot drives, and measure how soon it stands"
     ),
     "parity": Verb("lira.tools.verbs.parity", "the same motions on two robots, and where they differ"),
+    "doctor": Verb("lira.tools.verbs.doctor", "what is wrong with this machine and its devices, and the remedy"),
     "world": Verb("lira.tools.verbs.world", "draw a world from above and as the camera sees it"),
     "bench": Verb("lira.tools.verbs.bench", "measure speed on this machine"),
 }
@@ -56,10 +57,10 @@ EXTRAS = {
     "pybullet": "sim",
     "serial": "robot",
     "openni": "robot",
+    "av": "video",
     "joblib": "experiment",
     "torch": "learn",
     "safetensors": "learn",
-    "evdev": "joystick",
     "pygame": "console",
     "cryptography": "keys",
 }

@@ -4,6 +4,7 @@ from pathlib import Path
 from urllib.parse import urlsplit
 
 from lira.hal.errors import ConfigError
+from lira.robot.camera.address import parse_address, shown
 from lira.robot.camera.port import Source
 
 
@@ -14,12 +15,12 @@ def open_source(url: str, size: tuple[int, int], openni_folder: Path | None, *, 
     none of these forms, or one of a source that has no `depth`.
     """
     try:
-        scheme = urlsplit(url).scheme
+        scheme = urlsplit(parse_address(url).url).scheme
     except ValueError as error:
-        raise ConfigError(f"'{url}' is no address: {error}", "Give the camera's own address.") from error
+        raise ConfigError(f"'{shown(url)}' is no address", "Give the camera's own address.") from error
     if depth and scheme != "openni":
         remedy = "Take [depth] out of the profile and depth = true out of the settings, or use openni:."
-        raise ConfigError(f"'{url}' has no depth", remedy)
+        raise ConfigError(f"'{shown(url)}' has no depth", remedy)
     if scheme == "openni":
         from lira.robot.camera.astra import OpenniSource
 
@@ -37,6 +38,6 @@ def open_source(url: str, size: tuple[int, int], openni_folder: Path | None, *, 
 
         return FolderSource(Path(url))
     raise ConfigError(
-        f"'{url}' is no camera",
+        f"'{shown(url)}' is no camera",
         "Use openni: (Astra), /dev/video0 (UVC), http://... (MJPEG), rtsp://..., or a folder of images.",
     )

@@ -1,8 +1,7 @@
 """What a scene is to the sensors: something that can be photographed and that rays meet."""
 
 import math
-from dataclasses import dataclass
-from functools import lru_cache
+from dataclasses import dataclass, field
 from typing import Literal, NamedTuple, Protocol
 
 import numpy as np
@@ -35,11 +34,15 @@ class View:
     camera: Camera
     width_px: int
     height_px: int
+    tangents: tuple[float, float] = field(init=False)  # of half the angles of view, wide and high
+    bounds: Floats = field(init=False, repr=False, compare=False)  # the view's six sides, outward, [3, 6]
 
-    @property
-    def tangents(self) -> tuple[float, float]:
-        """Of half the angles of view, wide and high. The pixels need not be square."""
-        return math.tan(self.camera.hfov_rad / 2), math.tan(self.camera.vfov_rad / 2)
+    def __post_init__(self) -> None:
+        """Work out once what every picture needs. The pixels need not be square."""
+        wide, high = math.tan(self.camera.hfov_rad / 2), math.tan(self.camera.vfov_rad / 2)
+        sides = np.array([(1, 0, -wide), (-1, 0, -wide), (0, 1, -high), (0, -1, -high), (0, 0, -1), (0, 0, 1)])
+        object.__setattr__(self, "tangents", (wide, high))
+        object.__setattr__(self, "bounds", (sides / np.sqrt((sides**2).sum(1, keepdims=True))).T)
 
     def eye(self, pose: Pose) -> Floats:
         """Where the camera is on a robot at this pose, [3]."""
@@ -77,30 +80,24 @@ class Scene(Protocol):
         """Let go of it. May be called twice."""
 
 
-@lru_cache(maxsize=16)
 def backdrop(view: View, sky_gray: int, ground_gray: int) -> ByteArray:
-    """What is seen where nothing is drawn, uint8 [height, width], not to be written: sky, and floor below the horizon.
+    """What is seen where nothing is drawn, uint8 [height, width]: sky, and floor below the horizon.
 
     The floor is flat and has no end, and the camera does not roll, so this is exact; drawing it would take
     TinyRenderer longer than everything that stands on it.
     """
-    up = rows_up(view) * view.tangents[1]
-    column = np.where(up > math.tan(view.camera.pitch_rad), sky_gray, ground_gray).astype(np.uint8)
-    picture: ByteArray = np.repeat(column[:, None], view.width_px, axis=1)
-    picture.flags.writeable = False
+    up = math.tan(view.camera.pitch_rad) / view.tangents[1]  # the horizon, from 1 at the upper edge to -1 at the lower
+    sky_rows = min(max(math.ceil((1.0 - up) / 2.0 * view.height_px - 0.5), 0), view.height_px)
+    picture: ByteArray = np.empty((view.height_px, view.width_px), np.uint8)
+    picture[:sky_rows] = sky_gray
+    picture[sky_rows:] = ground_gray
     return picture
 
 
-@lru_cache(maxsize=16)
 def floor_distances_m(view: View) -> Floats:
     """Distance along the optical axis at which each row meets the floor [height]; infinite above the horizon."""
     pitch_rad = view.camera.pitch_rad
-    falls = math.sin(pitch_rad) - rows_up(view) * view.tangents[1] * math.cos(pitch_rad)  # per metre along the axis
+    up = 1.0 - (2.0 * np.arange(view.height_px) + 1.0) / view.height_px
+    falls = math.sin(pitch_rad) - up * view.tangents[1] * math.cos(pitch_rad)  # per metre along the axis
     with np.errstate(divide="ignore"):
         return np.where(falls > 0.0, view.camera.z_m / falls, np.inf)
-
-
-def rows_up(view: View) -> Floats:
-    """Middles of the rows, from 1 at the upper edge of the picture to -1 at the lower one."""
-    up: Floats = 1.0 - (2.0 * np.arange(view.height_px) + 1.0) / view.height_px
-    return up

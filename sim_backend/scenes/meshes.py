@@ -15,6 +15,9 @@ PAINT_STEP_M = 0.3
 # Paint over paint: each layer lies this far above the one before, the line on top at height 0. The floor itself is not
 # drawn, so nothing hides what is below it.
 LAYER_M = 0.001
+# Of two stretches of paint the directions differ by no more than rounding; and so many make one.
+STRAIGHT = 1e-9
+LONGEST = 8
 # Corners [n, 3], and four of them for each face [m, 4]: flat, and counter-clockwise from where it is seen.
 Indices = NDArray[np.intp]
 Mesh = tuple[Floats, Indices]
@@ -56,6 +59,25 @@ def mark_mesh(mark: Mark, z_m: float) -> Mesh:
     across = np.tile([-0.5, 0.5], count + 1) * short_m
     x, y = mark.x_m + cos * along - sin * across, mark.y_m + sin * along + cos * across
     return np.stack([x, y, np.full_like(x, z_m)], axis=-1), strip(count)
+
+
+def straighten(faces: Floats) -> Floats:
+    """Join what goes on straight: the faces [n, 4, 3] of a strip as fewer of at most so many stretches, [m, 4, 3].
+
+    A renderer likes small faces, but who counts edges is faster with large ones.
+    """
+    ahead, behind = faces[:, :2], faces[:, [3, 2]]  # right and left
+    ways = ahead - behind
+    ways /= np.sqrt((ways**2).sum(-1, keepdims=True))
+    bends = (np.abs(np.diff(ways, axis=0)) > STRAIGHT).any((1, 2)) | (ahead[:-1] != behind[1:]).any((1, 2))
+    begun = [0]
+    for number in range(1, len(faces)):
+        if bends[number - 1] or number - begun[-1] == LONGEST:
+            begun.append(number)
+    ends = [*begun[1:], len(faces)]
+    joined = faces[begun].copy()
+    joined[:, :2] = faces[np.array(ends) - 1, :2]
+    return joined
 
 
 def strip(count: int) -> Indices:

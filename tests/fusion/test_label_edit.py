@@ -14,6 +14,7 @@ from lira.fusion.log.label_log import (
     read_records,
     repair_log,
 )
+from lira.fusion.preprocess import Features
 from lira.hal.errors import ConfigError, StorageError
 from lira.hal.profile import load_profile
 
@@ -22,8 +23,8 @@ SIM, REAL = load_profile("thesis-sim"), load_profile("rosbot2")
 
 def label(k, source="human", *, lap=1, stored=True, profile=SIM):
     rng = np.random.default_rng(k)
-    scan, image = rng.random(profile.features.bins, np.float32), rng.random((32, 32), np.float32)
-    return Demonstration(0.2 * k, k, lap, source, (1.0, 0.01 * (k % 90)), (0.0, 0.0), stored, scan, image)
+    seen = Features(scan=rng.random(profile.features.bins, np.float32), image=rng.random((32, 32), np.float32))
+    return Demonstration(0.2 * k, k, lap, source, (1.0, 0.01 * (k % 90)), (0.0, 0.0), stored, seen)
 
 
 def written(path, *labels, profile=SIM):

@@ -1,19 +1,20 @@
 """When each rival hands control over and back, and what it learns; against numbers worked out by hand."""
 
 import math
-from dataclasses import replace
 
 import numpy as np
 import pytest
 from taught import FEATURES, make_novice
 
 from lira.fusion.methods.base import STAND, Call
+from lira.fusion.methods.doubt import DoubtLog
 from lira.fusion.methods.rivals.ensemble_dagger import EnsembleDagger, EnsembleDaggerSettings
 from lira.fusion.methods.rivals.gated import RobotGated, discrepancy
 from lira.fusion.methods.rivals.intervention_weighted import OWN, InterventionWeighted
 from lira.fusion.methods.rivals.lazy_dagger import LazyDagger, LazyDaggerSettings
 from lira.fusion.methods.rivals.probe import START, Probe
 from lira.fusion.methods.rivals.thrifty_dagger import ThriftyDagger, ThriftyDaggerSettings
+from lira.fusion.preprocess import Features
 
 NOVICE = (0.9, -0.3)
 FAR = (1.0, 1.0)
@@ -104,9 +105,23 @@ def test_what_the_person_does_is_learned_whoever_wanted_it():
 )
 def test_ensemble_dagger_needs_both_rules_to_drive_and_doubt_alone_to_call(doubt, human, over, back):
     settings = EnsembleDaggerSettings(tau=0.25, chi=0.1)
-    method = EnsembleDagger(make_novice(NOVICE)[0], lambda _: doubt, settings)
+    method = EnsembleDagger(make_novice(NOVICE)[0], DoubtLog(lambda _: doubt), settings)
     assert method.hands_over(FEATURES, NOVICE) is over
     assert method.hands_back(FEATURES, NOVICE, human) is back
+
+
+def test_ensemble_daggers_doubt_may_come_to_what_it_was_when_a_hand_came_uncalled():
+    doubts = [0.4]
+    method = EnsembleDagger(make_novice(NOVICE)[0], DoubtLog(lambda _: doubts[0]), EnsembleDaggerSettings())
+    assert step(method)[1].choice.call is Call.NONE  # nobody ever came
+    step(method, FAR)
+    step(method, FAR)
+    step(method)
+    assert method.chi == 0.4
+    doubts[0] = 0.5
+    assert step(method)[1].choice.call is Call.FEEDBACK
+    step(method, FAR)  # called: that says nothing about chi
+    assert method.chi == 0.4
 
 
 def test_the_discrepancy_is_the_squared_distance():
@@ -194,7 +209,7 @@ def test_thrifty_daggers_thresholds_follow_from_its_budget():
 
 def test_a_probe_says_nothing_until_it_has_seen_enough_and_then_tells_rare_places_apart():
     probe = Probe(seed=0)
-    near = replace(FEATURES, scan=np.full(101, 0.1, np.float32))
+    near = Features(scan=np.full(101, 0.1, np.float32), image=FEATURES.image)
     for _ in range(START - 1):
         probe.add(FEATURES, NOVICE, 0.0)
     probe.fit()

@@ -17,7 +17,7 @@ from lira.sim_backend.world import Box, Limits, Line, Piece, World
 
 PROFILE = load_profile("thesis-sim")
 PERIOD_S = PROFILE.period_s
-FEATURES = Features(np.zeros(101, np.float32), np.zeros((32, 32), np.float32))
+FEATURES = Features(scan=np.zeros(101, np.float32), image=np.zeros((32, 32), np.float32))
 QUIET = Proposal(FEATURES, Choice("novice", (1.0, 0.0)))
 CALLED = Proposal(FEATURES, Choice("novice", (1.0, 0.0), call=Call.FEEDBACK))
 SURE = {"delay_sigma": 0.0, "gain_sigma": 0.0, "wrong_direction": 0.0, "missed": 0.0}
@@ -114,8 +114,9 @@ def test_a_danger_that_passes_before_the_hand_moves_is_left_alone(crystal):
     assert drive(teacher(crystal, delay_s=0.6), crystal, "xx.xx.xxxx") == "---------H"
 
 
-def test_a_missed_danger_is_missed_for_as_long_as_it_lasts(crystal):
-    assert drive(teacher(crystal, delay_s=0.0, missed=1.0), crystal, "xxxxxxxxxx") == "----------"
+def test_a_missed_danger_is_seen_late_and_so_a_robot_that_stands_and_asks_does_not_stand_for_ever(crystal):
+    hand = teacher(crystal, delay_s=0.0, missed=1.0, notices_s=2.0)
+    assert drive(hand, crystal, "x" * 9 + ".." + "x" * 12) == "-" * 21 + "HH"
 
 
 def test_the_delay_is_log_normal_around_its_median(crystal):

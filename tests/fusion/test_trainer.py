@@ -8,11 +8,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 import torch
+from nets import lidar_net
 from test_learner import labels
 
 from lira.fusion.learning.learner import Learner
 from lira.fusion.learning.trainer import InlineTrainer, ProcessTrainer
-from lira.fusion.policies.networks import LidarNet
 from lira.hal.errors import LiraError
 
 WAIT_S = 60.0  # for what is certain to come; only a hang takes that long
@@ -27,7 +27,7 @@ def _one_thread():
 
 
 def learner(updates: int = 50) -> Learner:
-    return Learner(LidarNet(101), seed=1, frozen_trunks=False, updates=updates)
+    return Learner(lidar_net(101), seed=1, frozen_trunks=False, updates=updates)
 
 
 def process_trainer(**settings):
@@ -115,7 +115,7 @@ def test_the_process_gives_way_and_is_deaf_to_ctrl_c(real_time):
 CTRL_C = """
 import os, signal, threading
 from lira.fusion.learning.learner import Learner
-from lira.fusion.policies.networks import LidarNet
+from lira.fusion.policies.networks import ExpertNet
 from lira.fusion.learning.trainer import ProcessTrainer
 
 signal.signal(signal.SIGINT, lambda *_: None)
@@ -127,7 +127,7 @@ def press():
 
 threading.Thread(target=press).start()
 try:
-    ProcessTrainer(Learner(LidarNet(8), seed=0, frozen_trunks=False)).close()
+    ProcessTrainer(Learner(ExpertNet("scan", (8,)), seed=0, frozen_trunks=False)).close()
 finally:
     ready.set()
 """
@@ -170,9 +170,9 @@ def test_closing_in_the_middle_of_a_long_training_step_is_bounded():
 OWNER = """
 import time
 from lira.fusion.learning.learner import Learner
-from lira.fusion.policies.networks import LidarNet
+from lira.fusion.policies.networks import ExpertNet
 from lira.fusion.learning.trainer import ProcessTrainer
-trainer = ProcessTrainer(Learner(LidarNet(101), seed=0, frozen_trunks=False))
+trainer = ProcessTrainer(Learner(ExpertNet("scan", (101,)), seed=0, frozen_trunks=False))
 print(trainer.pid, flush=True)
 time.sleep(600)
 """

@@ -5,12 +5,14 @@ import pytest
 
 from lira.hal.errors import DeviceError
 from lira.tools.joystick.axes import AxisRange, PadState
+from lira.tools.joystick.finder import choose
 from lira.tools.joystick.mapping import load_mapping
-from lira.tools.joystick.nodes import Node, choose, fits, is_any_pad, motion_of, parse_bitmap, read_nodes
+from lira.tools.joystick.nodes import Node, is_any_pad, motion_of, parse_bitmap, read_nodes
 from lira.tools.joystick.pad_detect import moved_axis, pressed_button
+from lira.tools.joystick.rumble_motor import Motor
 
 PS3 = load_mapping("ps3")
-KEYS = frozenset(range(304, 319))
+KEYS = frozenset({*range(304, 319), *range(544, 548)} - {306, 309})
 
 
 def node(number, name="pad", *, buttons=KEYS, axes=frozenset(range(6)), uniq="1", motion=False):
@@ -44,9 +46,10 @@ def test_bitmaps_are_read_highest_word_first():
 
 def test_a_pad_is_known_by_its_controls_not_by_its_name():
     nodes = [KEYBOARD, MOTION, node(5, "anything"), node(6, "pad")]
-    assert choose(nodes, PS3).path == "/dev/input/event5"
-    assert not fits(node(7, axes=frozenset([0])), PS3)
-    assert choose([KEYBOARD, MOTION], PS3) is None
+    assert choose(nodes, PS3)[0].path == "/dev/input/event5"
+    assert choose(nodes)[1].name == "PS3"
+    assert choose([node(7, axes=frozenset([0]))], PS3) is None
+    assert choose([KEYBOARD, MOTION], PS3) is choose([KEYBOARD, MOTION]) is None
     assert [is_any_pad(n) for n in nodes] == [False, False, True, True]
 
 
@@ -59,10 +62,14 @@ def test_motion_sensors_belong_to_the_pad_with_the_same_address():
 def test_a_given_device_is_taken_through_a_link_and_refused_if_it_is_no_pad(tmp_path):
     link = tmp_path / "by-id"
     link.symlink_to("/dev/input/event6")
-    assert choose([node(5), node(6)], PS3, str(link)).path == "/dev/input/event6"
+    assert choose([node(5), node(6)], PS3, str(link))[0].path == "/dev/input/event6"
     assert choose([node(5)], PS3, "/dev/input/event9") is None
-    with pytest.raises(DeviceError, match="does not have the controls"):
-        choose([MOTION], PS3, MOTION.path)
+    for given in (PS3, None):
+        with pytest.raises(DeviceError, match="pad Motion Sensors"):
+            choose([MOTION], given, MOTION.path)
+    (tmp_path / "js0").touch()
+    with pytest.raises(DeviceError, match="is no event device"):
+        choose([node(5)], None, str(tmp_path / "js0"))
 
 
 def test_a_node_that_goes_away_while_it_is_read_is_left_out(tmp_path):
@@ -76,6 +83,10 @@ def test_learning_takes_the_control_that_moved_and_its_direction():
     up = PadState(ranges, {0: 140, 1: 0, 2: 0}, frozenset([311, 310]))
     axis = moved_axis(rest, up)
     assert (axis.axis, axis.inverted) == ("ABS_Y", True)
+    trigger = PadState(ranges, {0: 128, 1: 130, 2: 255}, frozenset([311]))
+    assert pressed_button(rest, trigger) == "ABS_Z+"
+    assert pressed_button(rest, trigger, frozenset(["ABS_Z"])) is None
+    assert pressed_button(rest, up, frozenset(["ABS_Y"])) == "BTN_TL"
     assert moved_axis(rest, PadState(ranges, {0: 160, 1: 130, 2: 0})) is None
     trigger = moved_axis(rest, PadState(ranges, {0: 128, 1: 130, 2: 255}))
     assert (trigger.axis, trigger.inverted) == ("ABS_Z", False)
@@ -89,31 +100,26 @@ class Motors:
     def __init__(self, *, gone=False):
         self.effects, self.running, self.gone, self.levels = set(), set(), gone, []
 
-    def capabilities(self):
-        return {21: [80]}
-
-    def upload_effect(self, effect):
+    def upload_rumble(self, level, longest_ms):
         if self.gone:
             raise OSError(19, "No such device")
-        assert 0 < effect.ff_replay.length <= 1000
-        self.levels.append(effect.u.ff_rumble_effect.strong_magnitude)
+        assert 0 < longest_ms <= 1000
+        self.levels.append(level)
         number = len(self.levels)
         self.effects.add(number)
         return number
 
-    def write(self, kind, number, value):
-        assert kind == 21
+    def play(self, number, on):
         assert number in self.effects
-        (self.running.add if value else self.running.discard)(number)
+        (self.running.add if on else self.running.discard)(number)
 
-    def erase_effect(self, number):
+    def erase(self, number):
         self.effects.remove(number)
 
 
 def test_motors_stop_for_certain_and_leave_no_effect_behind():
-    pad = pytest.importorskip("lira.tools.joystick.pad", reason="needs evdev: pip install 'lira-rosbot[joystick]'")
     device = Motors()
-    motor = pad.Motor(device)
+    motor = Motor(device)
     for strength in (1.0, 1.0, 0.5, 0.0, 0.0):
         motor.set(strength)
         assert bool(device.running) == (strength > 0.0)
@@ -122,8 +128,7 @@ def test_motors_stop_for_certain_and_leave_no_effect_behind():
 
 
 def test_a_pad_that_goes_while_it_rumbles_raises_nothing():
-    pad = pytest.importorskip("lira.tools.joystick.pad", reason="needs evdev: pip install 'lira-rosbot[joystick]'")
-    pad.Motor(Motors(gone=True)).set(1.0)
+    Motor(Motors(gone=True)).set(1.0)
 
 
 @pytest.mark.parametrize("verb", ["joystick", "console"])
@@ -137,9 +142,7 @@ def test_help_needs_neither_pygame_nor_evdev(verb):
     assert "examples:" in done.stdout
 
 
-@pytest.mark.parametrize(
-    ("verb", "package", "extra"), [("joystick", "evdev", "joystick"), ("console", "pygame", "console")]
-)
+@pytest.mark.parametrize(("verb", "package", "extra"), [("console", "pygame", "console")])
 def test_a_missing_package_is_named_before_a_robot_is_looked_for(verb, package, extra):
     code = f"import sys; sys.modules[{package!r}] = None; from lira.tools.cli import main; sys.exit(main([{verb!r}]))"
     done = subprocess.run([sys.executable, "-c", code], check=False, capture_output=True, text=True, timeout=60)
@@ -150,8 +153,9 @@ def test_a_missing_package_is_named_before_a_robot_is_looked_for(verb, package, 
     ]
 
 
-def test_the_bridge_needs_no_pygame():
-    code = "import sys; sys.modules['pygame'] = None; from lira.tools.joystick import bridge, client, pad, pad_wizard"
+def test_the_bridge_needs_no_package():
+    code = "import sys; sys.modules.update(pygame=None, evdev=None); "
+    code += "from lira.tools.joystick import bridge, client, pad, pad_wizard"
     assert subprocess.run([sys.executable, "-c", code], check=False, timeout=60).returncode == 0
 
 

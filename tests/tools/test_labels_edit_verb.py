@@ -13,7 +13,8 @@ from lira.fusion.log.run_log import RunRecord, RunWriter
 from lira.fusion.policies.checkpoint import load_checkpoint
 from lira.fusion.policies.kernel import KernelSettings
 from lira.fusion.policies.kernel_net import KernelNet
-from lira.fusion.policies.networks import CameraNet, LidarNet
+from lira.fusion.policies.networks import ExpertNet
+from lira.fusion.preprocess import Features
 from lira.hal.profile import load_profile
 from lira.tools.cli import main
 from lira.tools.runs.folder import LABELS, NOVICE, RECORD, snapshot
@@ -22,25 +23,25 @@ SIM = load_profile("thesis-sim")
 HEAD = RunRecord("line-obstacles", SIM.name, "plus", "plus", 0, 0, "lira demo", "0")
 # Two scenes, seen again and again: in the first all but the seventh label turn left, in the second nobody turns.
 SCENES = [np.random.default_rng(k) for k in (1, 2)]
-SEEN = [(rng.random(101, np.float32), rng.random((32, 32), np.float32)) for rng in SCENES]
+SEEN = [Features(scan=rng.random(101, np.float32), image=rng.random((32, 32), np.float32)) for rng in SCENES]
 GIVEN = [("camera", 0, 0.9)] * 4 + [("human", 1, 0.0)] * 2 + [("camera", 0, -0.9)] + [("human", 0, 0.9)] * 3
 
 
 def labels():
     for k, (source, scene, turn) in enumerate(GIVEN):
-        yield Demonstration(0.2 * k, k, 1, source, (1.0, turn), (0.0, 0.0), True, *SEEN[scene])
+        yield Demonstration(0.2 * k, k, 1, source, (1.0, turn), (0.0, 0.0), True, SEEN[scene])
 
 
 @pytest.fixture
 def folder(tmp_path):
-    trunks = KernelNet.from_experts(CameraNet(16, seed=1), LidarNet(101, seed=2))
+    trunks = KernelNet.from_experts([ExpertNet("image", (32, 32), 16, seed=1), ExpertNet("scan", (101,), seed=2)])
     novice = KernelNovice(trunks, LearningSettings(human_weight=3.0), KernelSettings(), mirrored=True)
     with DemonstrationLog(tmp_path / LABELS, SIM, mirrored=True) as log, RunWriter(tmp_path / RECORD) as record:
         record.write(HEAD)
         for label in labels():
             log.append(label)
             weight = novice.weight(label.source)
-            novice.remember(Label(label.scan, label.image, label.action, label.source, weight))
+            novice.remember(Label(label.features, label.action, label.source, weight))
         said = snapshot(tmp_path, novice, SIM, HEAD)()
     assert "this label contradicts the rest and is not followed: 6 (camera, lap 1 at 1.2 s: turn -0.90" in said
     return tmp_path
@@ -48,7 +49,7 @@ def folder(tmp_path):
 
 def turn(folder, scene):
     network, _ = load_checkpoint(folder / NOVICE)
-    return network.act(*SEEN[scene])[1]
+    return network.act(SEEN[scene])[1]
 
 
 def lira(capsys, *words):

@@ -8,7 +8,8 @@ from typing import TypeVar
 import cv2
 import numpy as np
 
-from lira.hal.bus.bus import Bus, Received
+from lira.hal.bus.bus import Bus
+from lira.hal.bus.reader import Received
 from lira.hal.bus.topics import APPLIED, BATTERY, CAMERA, DECISION, ODOM, OPERATOR_ANSWER, SCAN
 from lira.hal.messages import ByteArray, CompressedImage, Reason
 from lira.hal.profile import RobotProfile

@@ -29,7 +29,7 @@ def relearn(log: Path) -> tuple[KernelNovice, list[int]]:
     learned = []
     for number, label in enumerate(read_demonstrations(log)):
         if label.stored:
-            novice.remember(Label(label.scan, label.image, label.action, label.source, novice.weight(label.source)))
+            novice.remember(Label(label.features, label.action, label.source, novice.weight(label.source)))
             learned.append(number)
     return novice, learned
 

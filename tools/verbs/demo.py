@@ -28,7 +28,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from lira.hal.errors import ConfigError, MissingExtraError
-from lira.tools.options import add_protocol, natural
+from lira.tools.options import add_expert, add_layout, add_protocol, add_seed, natural
 
 if TYPE_CHECKING:
     from lira.tools.launch.launch import Part
@@ -46,15 +46,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add("--world", help="world by name or .toml file (default: line-obstacles; with --wire lane, which is shorter)")
     add("--profile", help="robot by name or .toml file (default: that of the world's experiment)")
     add("--method", default="plus", help="way of teaching, as in `lira fusion` (default: %(default)s)")
-    add(
-        "--expert",
-        action="append",
-        default=[],
-        metavar="MODULE:OBJECT",
-        help="beside the pair, an expert of your own, as in `lira fusion`; may be given several times",
-    )
-    add("--seed", type=natural, default=0, help="seeds teacher, training and noise (default: %(default)s)")
-    add("--layout", type=natural, default=0, help="layout to learn on (default: %(default)s)")
+    add_expert(parser)
+    add_seed(parser, "seeds teacher, training and noise")
+    add_layout(parser, "layout to learn on")
     add("--laps", type=natural, default=12, help="give up after so many training laps (default: %(default)s)")
     add("--unseen", type=natural, default=3, help="unseen layouts to drive afterwards (default: %(default)s)")
     add_protocol(parser, layouts="fresh", proof="fresh:3")
@@ -75,7 +69,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Run the demo from start to report."""
-    from lira.fusion.experts.files import SHIPPED, expert_path
+    from lira.fusion.experts.files import expert_path, experts_of
     from lira.fusion.experts.tasks import TASKS, task_of
     from lira.fusion.methods.syllabus import THESIS, with_proof
     from lira.hal.profile import load_profile
@@ -88,7 +82,7 @@ def run(args: argparse.Namespace) -> int:
     task = task_of(load_world(world).name)
     robot = args.profile or TASKS[task].profile
     profile = load_profile(robot)
-    for expert in SHIPPED:
+    for expert in experts_of(profile):
         expert_path(expert, profile, task)
     for package, extra in {**NEEDED, **(NEEDED_BY_WIRE if args.wire else {})}.items():
         if find_spec(package) is None:

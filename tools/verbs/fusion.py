@@ -27,66 +27,67 @@ from typing import TYPE_CHECKING
 from lira.fusion.experts.tasks import TASKS
 from lira.hal.errors import ConfigError
 from lira.tools.launch.lifetime import CLOSE_S
-from lira.tools.options import add_protocol, natural
+from lira.tools.options import DEFAULT, add_client, add_expert, add_layout, add_protocol, add_seed, natural
 
 if TYPE_CHECKING:
     from lira.hal.client.remote import RemoteRobot
     from lira.hal.messages import Decision
     from lira.tools.runs.teach import Plan
 
-ENDPOINT = "127.0.0.1:7447"
-
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Declare the arguments."""
+    """Declare the arguments: which robot, who drives, and how is taught."""
+    add_client(parser)
+    add_driver(parser)
+    add_teaching(parser)
+    add_layout(parser, "layout to learn on, and to reset a twin to")
+    add_seed(parser, "seeds teacher and training")
     add = parser.add_argument
-    add("--name", default="rosbot", help="the robot's name on the bus (default: %(default)s)")
-    add("--connect", default=ENDPOINT, metavar="HOST:PORT", help="where the robot listens (default: %(default)s)")
-    add(
-        "--arena",
-        metavar="HOST:PORT",
-        help="scripted teacher of a robot on a twin's devices: where that twin tells the truth (its --arena)",
-    )
+    add("--run", type=Path, metavar="DIR", help="folder for what is learned (default: runs/<method>)")
+    add("--as-command", help=argparse.SUPPRESS)  # what a report shows as the command that repeats the run
+
+
+def add_driver(parser: argparse.ArgumentParser) -> None:
+    """Declare who drives: a policy, or a method that learns."""
     what = parser.add_mutually_exclusive_group(required=True)
     what.add_argument(
         "--policy",
         help="drive only: camera-expert, lidar-expert, a .safetensors file, or your own MODULE:OBJECT",
-    )
-    add(
-        "--ask",
-        action="store_true",
-        help="with --policy: a novice of plus stands and calls where it knows less than in the runs that proved it",
-    )
-    add(
-        "--shield",
-        action="store_true",
-        help="what drives alone (--policy, --unseen): a turn that would touch what the lidar sees gives way to the "
-        "nearest one that does not",
-    )
-    add(
-        "--experts",
-        metavar="PAIR",
-        help=f"whose experts: a task ({', '.join(TASKS)}), TASK@SEED, or a folder with camera.safetensors and "
-        "lidar.safetensors (default: those of a twin's world; line)",
     )
     what.add_argument(
         "--method",
         help="learn by this method: plus, hold (LIRA-SPF), thesis, hg-dagger, ..., or your own MODULE:OBJECT; "
         "an unknown name lists them all",
     )
-    add(
-        "--expert",
-        action="append",
-        default=[],
-        metavar="MODULE:OBJECT",
-        help="beside the pair, an expert of your own: a function of lira.Features; may be given several times",
+    parser.add_argument(
+        "--ask",
+        action="store_true",
+        help="with --policy: a novice of plus stands and calls where it knows less than in the runs that proved it",
     )
+    parser.add_argument(
+        "--shield",
+        action="store_true",
+        help="what drives alone (--policy, --unseen): a turn that would touch what the lidar sees gives way to the "
+        "nearest one that does not",
+    )
+    parser.add_argument(
+        "--experts",
+        metavar="PAIR",
+        help=f"whose experts: a task ({', '.join(TASKS)}), TASK@SEED, or a folder with camera.safetensors and "
+        "lidar.safetensors (default: those of a twin's world; line)",
+    )
+    add_expert(parser)
+
+
+def add_teaching(parser: argparse.ArgumentParser) -> None:
+    """Declare how is taught, and by whom."""
+    add = parser.add_argument
     add("--start", choices=("human", "experts"), help="LIRA-SPF: who drives before the first training step")
     add(
         "--idle-frames",
         choices=("label", "skip"),
         default="label",
-        help="steps with the dead-man held and the stick at rest: labels as all others, or none (default: %(default)s)",
+        help=f"steps with the dead-man held and the stick at rest: labels as all others, or none {DEFAULT}",
     )
     add(
         "--teacher",
@@ -95,22 +96,18 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="who helps: a person with a gamepad (none), or on a twin a script with few, no or many human faults",
     )
     add(
-        "--train-laps",
-        type=natural,
-        default=12,
-        help="scripted teacher: give up after so many laps (default: %(default)s)",
+        "--arena",
+        metavar="HOST:PORT",
+        help="scripted teacher of a robot on a twin's devices: where that twin tells the truth (its --arena)",
     )
+    add("--train-laps", type=natural, default=12, help=f"scripted teacher: give up after so many laps {DEFAULT}")
     add_protocol(parser)
     add(
         "--unseen",
         type=natural,
         default=0,
-        help="(then) drive so many layouts alone, those after --layout (default: %(default)s)",
+        help=f"(then) drive so many layouts alone, those after --layout {DEFAULT}",
     )
-    add("--layout", type=natural, default=0, help="layout to learn on, and to reset a twin to (default: %(default)s)")
-    add("--seed", type=natural, default=0, help="seeds teacher and training (default: %(default)s)")
-    add("--run", type=Path, metavar="DIR", help="folder for what is learned (default: runs/<method>)")
-    add("--as-command", help=argparse.SUPPRESS)  # what a report shows as the command that repeats the run
 
 
 def run(args: argparse.Namespace) -> int:

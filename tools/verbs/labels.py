@@ -26,6 +26,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from lira.hal.errors import ConfigError
+from lira.tools.options import add_json
 
 if TYPE_CHECKING:
     from lira.fusion.log.label_salvage import Survey
@@ -50,7 +51,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--repair", action="store_true", help="check: put a clean file in its place, and keep the damaged one beside it"
     )
     add("--profile", help="check: whose labels they are, if the file does not say (default: the known robots)")
-    add("--json", metavar="FILE", help="write a JSON object to FILE (-: standard output)")
+    add_json(parser)
 
 
 def run(args: argparse.Namespace) -> int:
@@ -106,7 +107,6 @@ def undo(args: argparse.Namespace) -> int:
 def explain(args: argparse.Namespace) -> int:
     """Say which labels make an action."""
     from lira.fusion.log.label_log import read_demonstrations
-    from lira.fusion.preprocess import Features
     from lira.tools.labels.choose import nearest, one_of
     from lira.tools.labels.relearn import relearn
     from lira.tools.labels.words import pair, part_rows, part_table
@@ -118,7 +118,7 @@ def explain(args: argparse.Namespace) -> int:
     at = one_of(labels, wanted_of(args).numbers) if args.number else nearest(labels, args.time, args.run)
     novice, learned = relearn(path)
     label = labels[at]
-    seen = Features(label.scan, label.image)
+    seen = label.features
     rows = part_rows(novice.explain(seen), learned, labels)
     action, alone, deviation = novice.act(seen), novice.alone(seen), novice.deviation(seen)
     where = f"label {at} (run {label.run}, lap {label.lap}, {label.stamp_s:.1f} s) says {pair(label.action)}"
@@ -180,7 +180,7 @@ def wanted_of(args: argparse.Namespace) -> "Wanted":
 
 def tell(args: argparse.Namespace, found: dict[str, Any], said: str) -> int:
     """Write JSON where it is wanted, and say the same in words unless JSON goes where they would."""
-    from lira.tools.verbs.bench import write_file
+    from lira.tools.output.machine import write_file
 
     text = json.dumps(found, indent=2)
     if args.json not in (None, "-"):

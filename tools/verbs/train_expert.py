@@ -20,15 +20,17 @@ from pathlib import Path
 
 from lira.fusion.experts.tasks import DEFAULT, TASKS
 from lira.hal.errors import ConfigError, LiraError, StorageError
-from lira.tools.options import natural
+from lira.tools.options import add_seed
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the verb's arguments."""
-    parser.add_argument("expert", choices=["camera", "lidar"], help="which sensor it sees")
+    from lira.fusion.experts.files import EXPERTS
+
+    parser.add_argument("expert", choices=EXPERTS, help="which sensor it sees")
     parser.add_argument("--task", choices=TASKS, default=DEFAULT, help="what it is for (default: %(default)s)")
     parser.add_argument("--profile", help="robot profile (default: the task's)")
-    parser.add_argument("--seed", type=natural, default=0, help="seed of everything random (default: %(default)s)")
+    add_seed(parser, "seed of everything random")
     parser.add_argument("--out", type=Path, help="checkpoint to write (default: the one that comes with the project)")
 
 
@@ -38,9 +40,9 @@ def run(args: argparse.Namespace) -> int:
     from lira.hal.profile import load_profile
     from lira.tools.runs.expert_training import command, train_expert
 
-    owner = TASKS[args.task].lidar
-    if args.expert == "lidar" and owner != args.task:
-        what = f"the task '{args.task}' has no lidar expert of its own: it uses that of '{owner}'"
+    owner = TASKS[args.task].owner(args.expert)
+    if owner != args.task:
+        what = f"the task '{args.task}' has no {args.expert} expert of its own: it uses that of '{owner}'"
         raise ConfigError(what, f"Train that one with --task {owner}.")
     profile = load_profile(args.profile or TASKS[args.task].profile)
     path = args.out or shipped_path(args.expert, profile, args.task)

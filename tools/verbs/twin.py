@@ -21,7 +21,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from lira.hal.errors import ConfigError
-from lira.tools.options import natural
+from lira.tools.options import add_layout, add_profile, add_seed, add_server, add_world
 
 if TYPE_CHECKING:
     from lira.hal.bus.bus import Bus
@@ -40,18 +40,11 @@ ECHOES = 0.5  # of the directions ahead: with less the learner refuses the scan
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
     add = parser.add_argument
-    add("--world", default="line", help="world by name or .toml file (default: %(default)s)")
-    add("--profile", default="thesis-sim", help="robot by name or .toml file (default: %(default)s)")
-    add("--name", default="rosbot", help="robot's name: every key on the bus begins with it (default: %(default)s)")
-    add(
-        "--listen",
-        default="127.0.0.1:7447",
-        metavar="HOST:PORT",
-        help="where drivers connect; 0.0.0.0:7447 lets other machines in (default: %(default)s, this machine only)",
-    )
-    add("--insecure", action="store_true", help="let other machines in without keys (see lira keys)")
-    add("--layout", type=natural, default=0, help="which random layout of the world's boxes (default: %(default)s)")
-    add("--seed", type=natural, default=0, help="seeds the sensors' noise (default: %(default)s)")
+    add_world(parser, "line")
+    add_profile(parser, "thesis-sim")
+    add_server(parser)
+    add_layout(parser, "which random layout of the world's boxes")
+    add_seed(parser, "seeds the sensors' noise")
     pace = parser.add_mutually_exclusive_group()
     pace.add_argument("--speed", type=float, default=1.0, metavar="X", help="times real time (default: %(default)g)")
     pace.add_argument("--lockstep", action="store_true", help="time passes only when the driver has answered")

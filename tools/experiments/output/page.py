@@ -12,7 +12,7 @@ import matplotlib as mpl
 from lira.hal.errors import StorageError
 from lira.tools.bench import cell, columns
 from lira.tools.experiments.experiment import Finding, Picture, Row
-from lira.tools.experiments.summary import Summary
+from lira.tools.experiments.output.summary import Summary
 from lira.tools.report.page import section
 
 mpl.rcParams["svg.hashsalt"] = "lira"  # the same data, the same file

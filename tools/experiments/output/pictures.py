@@ -9,7 +9,7 @@ from lira.tools.experiments.trial import Outcome
 
 def box_pictures(groups: Mapping[str, Sequence[Outcome]], quantities: Sequence[str]) -> list[Picture]:
     """One box plot per quantity of the results, a box per group."""
-    from lira.tools.experiments import plots
+    from lira.tools.experiments.output import plots
 
     cut = {name: [not each.result.converged for each in group] for name, group in groups.items()}
     return [

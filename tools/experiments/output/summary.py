@@ -14,7 +14,7 @@ MOST_BYTES = 2**24
 
 class Summary(msgspec.Struct, frozen=True, omit_defaults=True):
     """An experiment's numbers. `results` are the rows of its first table, `ratios` empty where nothing is paired.
-    `quality` is there where an experiment tells how good the novices are on layouts they have not seen.
+    `quality` and `curves` are there where an experiment tells how good the novices are on layouts they have not seen.
 
     `fingerprints` says with which code and experts the trials were played: one for each pair of experts.
     """
@@ -31,6 +31,7 @@ class Summary(msgspec.Struct, frozen=True, omit_defaults=True):
     tables: list[Table]
     findings: list[Finding]
     quality: list[Row] = []
+    curves: list[Row] = []
 
 
 def summarise(name: str, words: str, command: str, seeds: int, experiment: Experiment, outcomes: Outcomes) -> Summary:
@@ -49,6 +50,7 @@ def summarise(name: str, words: str, command: str, seeds: int, experiment: Exper
         tables=tables,
         findings=experiment.findings(outcomes),
         quality=experiment.quality(outcomes),
+        curves=experiment.curves(outcomes),
     )
 
 
@@ -73,5 +75,9 @@ def read_summary(path: Path) -> Summary:
 
 
 def read_summaries(folder: Path, names: Sequence[str]) -> list[Summary]:
-    """Read those of the named experiments that the folder has, in the order of the names."""
-    return [read_summary(path) for path in (folder / f"{name}.json" for name in names) if path.exists()]
+    """Read those of the named experiments that the folder has, in the order of the names.
+
+    After each come those of the same experiment elsewhere: NAME-WHERE.json.
+    """
+    paths = [path for name in names for path in (folder / f"{name}.json", *sorted(folder.glob(f"{name}-*.json")))]
+    return [read_summary(path) for path in paths if path.exists()]

@@ -56,6 +56,24 @@ def intervals(rows: Sequence[Row], thesis: Mapping[str, float]) -> Figure:
     return figure
 
 
+def curves(rows: Sequence[Row]) -> Figure:
+    """Share passed against what it took, a step curve per method; the two levels of quality are dashed."""
+    figure = Figure(figsize=(7.5, 3.8), layout="constrained")
+    axes = figure.subplots()
+    for index, name in enumerate(dict.fromkeys(str(row["method"]) for row in rows)):
+        own = [row for row in rows if row["method"] == name]
+        at, rate = ([float(str(row[key])) for row in own] for key in ("at", "share"))
+        dashes = "-" if index < len(COLOURS) else ":"
+        axes.plot(at, 100.0 * np.array(rate), dashes, marker="o", color=COLOURS[index % len(COLOURS)], label=name)
+    for level in (90, 97):
+        axes.axhline(level, color="#9aa1a9", linestyle="--", linewidth=0.8)
+    axes.set_ylim(0, 102)
+    axes.set_xlabel(str(rows[0]["quantity"]).replace("_", " ") if rows else "")
+    axes.set_ylabel("fresh layouts passed, %")
+    axes.legend(fontsize=7, loc="center left", bbox_to_anchor=(1.0, 0.5))
+    return figure
+
+
 def paired_bars(names: Sequence[str], series: Mapping[str, Sequence[float]], quantity: str) -> Figure:
     """Bars side by side, one group per name; zero-height bars of a logarithmic scale are left out."""
     figure = Figure(figsize=(2 + 1.1 * len(names), 3.4), layout="constrained")
