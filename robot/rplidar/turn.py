@@ -79,6 +79,9 @@ class TurnCutter:
         swept = np.unwrap(np.concatenate([before, (theta_rad - self._seam_rad) % math.tau]))[len(before) :]
         bearing_rad = self._sign * theta_rad + self._mounting.yaw_offset_rad
         points = Turn((bearing_rad + math.pi) % math.tau - math.pi, distance_m, time_s)
+        if swept[-1] < -math.pi:  # heads do not turn back: what came between was none of it
+            self.restart()
+            return []
         furthest_rad, swept_rad = max(self._furthest_rad, float(swept.max())), float(swept[-1])
         turned = []
         while furthest_rad >= math.tau + self._back_rad:

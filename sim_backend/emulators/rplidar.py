@@ -201,14 +201,14 @@ class RplidarUnit:
             if now_s < begins_s:
                 return
             self._began_s = begins_s
+        beyond = 1 if mode.answer == 0x84 else 0  # such a packet has to know the next one's first distance
         taken = int((now_s - self._began_s) / mode.sample_s)
-        if taken <= self._taken:
+        if taken < self._sent + mode.points + beyond:
             return
         at_s: Floats = self._began_s + np.arange(self._taken, taken, dtype=np.float64) * mode.sample_s
         self._taken = taken
         theta_rad = self.head.turns(at_s) % 1.0 * math.tau
         self._pending = self._pending.then(self._optics.look(theta_rad, corrected=mode.answer != 0x85))
-        beyond = 1 if mode.answer == 0x84 else 0  # such a packet has to know the next one's first distance
         while len(self._pending.theta_rad) >= mode.points + beyond:
             packet = self._packet(mode, self._pending.part(0, mode.points + beyond))
             self._pending = self._pending.part(mode.points)

@@ -146,8 +146,8 @@ class WiredTwin:
 def sweeping(profile: RobotProfile) -> RobotProfile:
     """Return the profile for a twin behind wires.
 
-    A head that turns sees now what the twin takes in whole turns. And wheels that swing about the fastest speed are
-    now and then faster; who limits it is the robot's side.
+    A head that turns sees now what the twin takes in whole turns, and its unit has blanks of its own. And wheels that
+    swing about the fastest speed are now and then faster; who limits it is the robot's side.
     """
     base, swing_m_s = profile.base, 2 * profile.base.acceleration_m_s2 * PERIOD_S
     base = replace(
@@ -155,7 +155,7 @@ def sweeping(profile: RobotProfile) -> RobotProfile:
         max_linear_m_s=base.max_linear_m_s + swing_m_s,
         max_angular_rad_s=base.max_angular_rad_s + 2 * swing_m_s / base.track_m,
     )
-    return replace(profile, base=base, lidar=replace(profile.lidar, rate_hz=1.0 / LOOK_S))
+    return replace(profile, base=base, lidar=replace(profile.lidar, rate_hz=1.0 / LOOK_S, dropout=0.0))
 
 
 def jpeg_of(image: Image | CompressedImage) -> bytes:

@@ -310,4 +310,4 @@ HEADS = st.builds(descriptor, st.integers(0, 2**30 - 1), st.integers(0, 255))
 def test_whatever_comes_over_its_line_it_scans_on(scanning, odd):
     scanning.wire.inject(odd)
     scanning.wait_scans(3, 10.0)
-    assert scanning.supervisor.losses == 0
+    assert scanning.supervisor.losses == 0, scanning.supervisor._failure
