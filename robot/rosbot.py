@@ -48,7 +48,6 @@ class Rosbot:
     """Implements `hal.port.Robot`, `MotorSwitch`, `SensorEvents`, `DeviceMonitor` and `SelfDiagnosis`.
 
     Its clock is the monotonic clock.
-
     A device that is lost ("lidar", "camera", "base") is opened again by itself; to stand meanwhile is the governor's.
     """
 

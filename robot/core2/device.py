@@ -262,14 +262,15 @@ class Core2:
         line.write(self._frame_of(twist))
         self._sent_s = now_s
         self.counts.commands += 1
-        if not silent and now_s >= self._call_s:
+        called = not silent and now_s >= self._call_s
+        if called:
             self._call_s = now_s + CALL_S
             self._board.configure("EWCH", "1")
-            if self._board.kinematics is None:
-                self._board.configure(ASK_KINEMATICS)
         if not silent and self._motors_told is not off and (braked or not off):
             self._motors_told = off
             self._board.configure("EMOT", "0" if off else "1")
+        if called and self._board.kinematics is None:  # last: nothing waits for it
+            self._board.configure(ASK_KINEMATICS)
         return now_s
 
     def _frame_of(self, twist: Twist) -> bytes:

@@ -48,6 +48,7 @@ class Stream:
         self._newest_s = -math.inf
         self._middles_s: deque[float] = deque(maxlen=TURNS + 1)  # of turns
         self.newest: Turn | None = None
+        self.rate_hz = math.nan  # turns per second of late; nan before the second. Another thread may ask
         self.turns = 0  # that were complete, shown or not
 
     def feed(self, data: bytes, now_s: float) -> list[LaserScan]:
@@ -69,6 +70,7 @@ class Stream:
             self.turns += 1
             self.newest = turn
             self._middles_s.append(float(np.mean(turn.time_s)))
+            self.rate_hz = self._measured_hz()
             scan = scan_of(turn, self._lidar, ascending_time=self._ascending_time)
             if scan is None:
                 self._counts.dropped_turns += 1
@@ -77,9 +79,7 @@ class Stream:
                 scans.append(scan)
         return scans
 
-    @property
-    def rate_hz(self) -> float:
-        """Turns per second of late; nan before the second."""
+    def _measured_hz(self) -> float:
         period_s = float(np.median(np.diff(self._middles_s))) if len(self._middles_s) > 1 else 0.0
         return 1.0 / period_s if period_s > 0.0 else math.nan
 
