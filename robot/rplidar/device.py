@@ -148,7 +148,8 @@ class RPLidar:
         """Trim the motor; returns whether it was told anything."""
         duty = None if self._speed is None else self._speed.turned(stream.rate_hz, now_s)
         if duty is not None:
-            line.write(protocol.encode_motor(duty))
+            with contextlib.suppress(DeviceError):  # it scans: a line that is lost is noticed where it is read
+                line.write(protocol.encode_motor(duty))
         return duty is not None
 
     def _judge(self, mode: Mode, stream: Stream, *, heard: bool) -> None:

@@ -172,7 +172,8 @@ class Core2Unit:
             self._announce()
         elif topic == 10:
             sec, nsec = struct.unpack("<II", payload)
-            self._clock_s, self._answered_s = sec + nsec * 1e-9 - now_s, now_s
+            # It adds all the time since it asked: a question that was heard late sets its clock ahead.
+            self._clock_s, self._answered_s = sec + nsec * 1e-9 - max(self._asked_s, 0.0), now_s
         elif topic == 11:
             self.configured = False
         elif topic == self.subscribed["cmd_vel"]:
