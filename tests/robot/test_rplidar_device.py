@@ -93,14 +93,14 @@ UNITS = {
 def test_it_scans_at_the_right_speed_in_the_best_mode(tmp_path, name):
     model, mode = UNITS[name]
     with Bench(tmp_path / "lidar", model) as bench:
-        scan = bench.wait_scans(2)
+        scan = bench.wait_scans(5)
         assert bench.driver.mode.answer.name == mode
         assert bench.driver.info.firmware == model.firmware
         assert around(scan, 0) == pytest.approx(1.0, abs=0.02)
         assert around(scan, 90) == pytest.approx(2.0, abs=0.03)
         assert around(scan, 40) == pytest.approx(1.0 / math.cos(math.radians(40)), abs=0.05)
         assert np.isnan([at(scan, degrees) for degrees in (180, -120, 140)]).all()
-        assert scan.scan_time == pytest.approx(0.1, abs=0.02)
+        assert np.median([each.scan_time for each in bench.scans]) == pytest.approx(0.1, abs=0.02)
         assert scan.time_increment < 0.0
         assert 0.0 <= time.monotonic() - scan.stamp_s < 0.5
         assert bench.driver.counts.lost_bytes == 0
