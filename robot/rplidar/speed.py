@@ -54,11 +54,14 @@ class TurnWatchdog:
     def __init__(self, url: str, now_s: float) -> None:
         self._url = url
         self._turns = 0
-        self._turned_s = self._heard_s = now_s
+        self._turned_s = self._heard_s = self._looked_s = now_s
         self._points, self._pointed_s = 0, now_s
 
     def look(self, now_s: float, *, heard: bool, points: int, turns: int, swept_rad: float) -> None:
         """Raise `DeviceError` for one that is lost. `points` and `turns` have come, the head went `swept_rad` since."""
+        if now_s - self._looked_s > SILENCE_S:  # who watches stood still: that says nothing of the unit
+            self._turned_s = self._heard_s = self._pointed_s = now_s
+        self._looked_s = now_s
         if heard:
             self._heard_s = now_s
         if points > self._points:

@@ -96,6 +96,11 @@ def look(watchdog, now_s, **told):
     watchdog.look(now_s, **{"heard": True, "points": 0, "turns": 0, "swept_rad": 0.0} | told)
 
 
+def look_on(watchdog, times_s, **told):
+    for now_s in times_s:
+        look(watchdog, now_s, **told)
+
+
 def test_a_head_may_take_ten_seconds_to_begin():
     watchdog = TurnWatchdog("lidar", 0.0)
     for tick in range(99):
@@ -115,7 +120,14 @@ def test_a_head_may_take_ten_seconds_to_begin():
 )
 def test_bytes_without_turns_are_a_loss_and_why_is_said(told, words):
     watchdog = TurnWatchdog("lidar", 0.0)
-    look(watchdog, 2.0, points=400, turns=1)
-    look(watchdog, 2.4, points=650 if "swept_rad" in told else 400, turns=1, heard=told.get("heard", True))
+    look(watchdog, 0.1, points=400, turns=1)
+    look(watchdog, 0.5, points=650 if "swept_rad" in told else 400, turns=1, heard=told.get("heard", True))
     with pytest.raises(DeviceError, match=words):
-        look(watchdog, 3.05, turns=1, **told)
+        look_on(watchdog, (0.9, 1.15), turns=1, **told)
+
+
+def test_a_watchdog_that_stood_still_itself_accuses_nobody():
+    watchdog = TurnWatchdog("lidar", 0.0)
+    look(watchdog, 0.1, points=400, turns=1)
+    look(watchdog, 5.0, points=400, turns=1, heard=False)
+    look(watchdog, 5.4, points=400, turns=1)
