@@ -24,6 +24,7 @@ class Verb(NamedTuple):
 
 VERBS = {
     "demo": Verb("lira.tools.verbs.demo", "teach a robot in the digital twin, from start to report, in minutes"),
+    "teach": Verb("lira.tools.verbs.teach", "teach a robot yourself, from practice to a verdict"),
     "twin": Verb("lira.tools.verbs.twin", "the digital twin: a simulated ROSbot on the bus"),
     "robot": Verb(
         "lira.tools.verbs.robot", "the physical ROSbot: opens its lidar, camera and base, and puts it on the bus"
