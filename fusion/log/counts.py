@@ -63,7 +63,7 @@ class Ledger:
         self.calls += calls
 
     def take_back(self, source: str, count: int) -> None:
-        """So many stored labels of a source were taken back; the human's are the newest, the demonstration's go last."""
+        """So many stored labels of a source were taken back; the demonstration's go last."""
         taken = min(count, self._stored[source])
         self._stored[source] -= taken
         if source == Driver.HUMAN:

@@ -1,7 +1,8 @@
-"""A scripted person as a process of its own: it sees the twin, hears the voice, and drives as a hand does, over teleop.
+"""A scripted person as a process: it sees the twin, hears the voice, and drives as a hand does, over teleop.
 
-It stands for a person in tests of `lira teach`. It does not know what the novice will do, and expects that it goes on as
-it does now for a moment, and then as the experts do. Usage `python -m lira.tools.live.scripted_person NAME HOST:PORT WORLD LAYOUT SPEED SKILL SEED`.
+It stands for a person in tests of `lira teach`. It does not know what the novice will do, and expects that it goes on
+as it does now for a moment, and then as the experts do. It is told which robot and which twin by its arguments: NAME
+HOST:PORT WORLD LAYOUT SPEED SKILL SEED.
 """
 
 import itertools

@@ -10,12 +10,9 @@
 | verdict | nobody | the person takes the controls to go on, or ends the session |
 """
 
-import time
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from threading import Event
-
-import numpy as np
 
 from lira.fusion.control import HELD, ControlLoop, Step
 from lira.fusion.learning.learned_policy import LearnedPolicy
@@ -23,10 +20,9 @@ from lira.fusion.log.recorder import Journal
 from lira.fusion.log.run_log import LapRecord, ResultRecord
 from lira.fusion.methods.base import Method
 from lira.fusion.operator_service import Answer, OperatorService
-from lira.fusion.teaching.session import BLIND_M, Drive, Tally, after_crash, lap_record
+from lira.fusion.teaching.session import Drive, Tally, after_crash, lap_record
 from lira.hal.messages import (
     Applied,
-    Call,
     Driver,
     Episode,
     OperatorRequest,
@@ -37,14 +33,14 @@ from lira.hal.messages import (
     Stage,
 )
 from lira.hal.port import Arena, Robot
+from lira.tools.live.board import Board
 from lira.tools.live.classroom import Classroom
 from lira.tools.live.hand import Hand
+from lira.tools.live.lap import Fate, count, fate, is_helped
+from lira.tools.live.requests import TAUGHT, reply
 from lira.tools.live.verdict import has_passed, judged_words, verdict_words
 from lira.tools.runs.course import Course
 from lira.tools.runs.teach import Say
-
-REPORT_S = 0.5
-_GO_ON = (Request.RESUME, Request.PAUSE)  # the same button
 
 
 @dataclass(frozen=True, slots=True)
@@ -75,9 +71,8 @@ class LiveSession:
     ) -> None:
         self._robot, self._arena, self._course, self.loop = robot, arena, course, loop
         self._classroom, self._journal, self._hand, self._rules = classroom, journal, hand, rules
-        self._say, self._publish, self._explain = say, publish, explain
-        self._state = SessionState(robot.now(), Stage.PRACTICE, rules.person)
-        self._shown_s = -REPORT_S
+        self._say, self._explain = say, explain
+        self.board = Board(rules.person, journal.ledger, robot.now, publish, say)
         self._asked: Request | None = None  # what ends the present lap
         self._proof: list[LapRecord] = []
         self._episode = Episode()
@@ -89,39 +84,20 @@ class LiveSession:
         self.stop = Event()
 
     def take(self, asked: OperatorRequest) -> Answer | None:
-        """Answer what a session answers, by the stage that it is at; None for the rest."""
-        request, stage = asked.request, self._state.stage
-        if request is Request.FINISH or (request is Request.PROVE and stage is Stage.VERDICT):
-            self._asked = Request.FINISH
-            return True, "the session ends"
-        if stage is Stage.PRACTICE and request in _GO_ON:
-            self._asked = Request.RESUME
-            return True, "practice is over"
-        if stage is Stage.VERDICT and request in _GO_ON:
-            self._asked = Request.RESUME
-            return True, "teaching goes on"
-        if stage is Stage.JUDGING and request in (Request.PROVE, Request.PASSED, Request.RESET, Request.FAILED):
-            passed = request in (Request.PROVE, Request.PASSED)
-            self._asked = Request.PASSED if passed else Request.FAILED
-            return True, "noted: passed" if passed else "noted: failed"
-        if request is Request.UNDO:
-            return self._undo()
-        if request is Request.PROVE:
-            return self._ask_for_proof()
-        if request in (Request.PASSED, Request.FAILED):
-            return False, "there is nothing to judge now"
-        if request is Request.RESET and stage in (Stage.DEMONSTRATION, Stage.TEACHING, Stage.PROVING):
-            self._asked = Request.RESET
-            return True, "a new lap" if self._arena is None else "a new lap, from the start"
-        return None
+        """Answer what a session answers; None to the rest."""
+        replied = reply(asked.request, self.board.stage, trained=self._novice.trained)
+        if replied is not None:
+            self._asked = replied.ends or self._asked
+            return replied.answer
+        return self._undo() if asked.request is Request.UNDO else None
 
     def run(self) -> None:
         """Go through the stages until the session ends or is stopped."""
         if self._rules.practice_s > 0.0:
             self._practise()
-        while not self._is_over and self._state.laps < self._rules.laps:
+        while not self._is_over() and self.board.state.laps < self._rules.laps:
             lap = self._teach()
-            if self._is_over:
+            if self._is_over():
                 break
             unaided = lap is not None and lap.passed and lap.unassisted and self._course is not None
             if self._novice.trained and (self._asked is Request.PROVE or unaided):
@@ -134,7 +110,7 @@ class LiveSession:
         ledger = self._journal.ledger
         return ResultRecord(
             converged=self.converged,
-            laps=self._state.laps,
+            laps=self.board.state.laps,
             human_labels=ledger.labels.stored_human,
             demonstration=ledger.labels.demonstration,
             interventions=ledger.interventions,
@@ -150,13 +126,12 @@ class LiveSession:
     @property
     def words(self) -> str:
         """The newest verdict; empty if there was none."""
-        return self._state.words
+        return self.board.state.words
 
     @property
     def _novice(self) -> LearnedPolicy:
         return self._classroom.method.novice
 
-    @property
     def _is_over(self) -> bool:
         return self.stop.is_set() or self._asked is Request.FINISH
 
@@ -169,7 +144,7 @@ class LiveSession:
         self._say(f"practice: hold the dead-man and drive for {self._rules.practice_s:.0f} s; nothing is learned")
         driven_s, before_s = 0.0, self._robot.now()
         self._asked = None
-        while not self._is_over and self._asked is None and driven_s < self._rules.practice_s:
+        while not self._is_over() and self._asked is None and driven_s < self._rules.practice_s:
             self._idle()
             now_s = self._robot.now()
             driven_s += (now_s - before_s) * self._hand.holds
@@ -177,27 +152,25 @@ class LiveSession:
             state = None if self._arena is None else self.loop.truth()
             if state is not None and (state.collided or state.lost or state.finished):
                 self._put(self._episode)
-        self._asked = self._asked if self._is_over else None
+        self._asked = self._asked if self._is_over() else None
 
     def _await_hand(self) -> None:
         """Nothing drives off before a hand was on the controls."""
         self._show(Stage.READY)
         self._say("ready: put your hand on the dead-man; from then on it drives and learns")
-        while not self._is_over and not self._hand.holds:
+        while not self._is_over() and not self._hand.holds:
             self._idle()
         self._was_there = True
 
     def _teach(self) -> LapRecord | None:
         """A lap of teaching; None if it was cut off."""
-        number = self._state.laps + 1
-        self._state = replace(self._state, laps=number, proven=0, shown=0)
-        self._proof = []
+        number, self._proof = self.board.begin_lap(), []
         drive = None if self._course is None else self._course.taught(number)[0]
         return self._lap(self._classroom.method, drive, Phase.TRAIN, number)
 
     def _prove(self) -> None:
         """The novice alone: on a twin here and on unseen layouts, on a floor as the person judges."""
-        method, number = self._classroom.method, self._state.laps
+        method, number = self._classroom.method, self.board.state.laps
         if self._course is None:
             self._show(Stage.JUDGING)
             self._say("judge it: it drives alone. Passed or failed? To take over is a failure")
@@ -214,28 +187,27 @@ class LiveSession:
             for place, (phase, drive) in enumerate(runs, start=1):
                 if not self._note_proof(self._lap(method.alone(phase), drive, phase, place)) and phase == Phase.PROVE:
                     break
-                if self._is_over or self._asked is not None:
+                if self._is_over() or self._asked is not None:
                     break
             self.converged = len(self._proof) == len(runs) and has_passed(self._proof)
             words = verdict_words(self._proof)
-        self._state = replace(self._state, words=words)
+        self.board.note_proof(self._proof, words)
         self._say(f"verdict: {words}. {'It passed' if self.converged else 'Not yet'}: stop, or go on?")
 
     def _note_proof(self, lap: LapRecord | None) -> bool:
         if lap is None:
             return False
         self._proof.append(lap)
-        proven = sum(each.passed for each in self._proof)
-        self._state = replace(self._state, proven=proven, shown=len(self._proof))
+        self.board.note_proof(self._proof)
         return lap.passed
 
     def _await_word(self) -> None:
         """Stand until the person says whether to stop or to go on; a hand on the controls goes on."""
-        if self._is_over:
+        if self._is_over():
             return
         self._asked = None
         self._show(Stage.VERDICT)
-        while not self._is_over and self._asked is None and not self._hand.holds:
+        while not self._is_over() and self._asked is None and not self._hand.holds:
             self._idle()
 
     # A lap
@@ -250,12 +222,12 @@ class LiveSession:
         over = False
         while not over:
             self._serve(method)
-            if self._is_over or self._asked is not None:
+            if self._is_over() or self._asked is not None:
                 break
             step = self._step(method)
             if step is not None:
                 self._note(step, tally, phase, number)
-            over = self._look(step, method, drive, phase, tally, began_s)
+            over = self._look(step, method, drive, (phase, tally, began_s))
         if not over and not (drive is None and self._asked in (Request.PASSED, Request.FAILED, Request.RESET)):
             return None
         if drive is None:
@@ -272,55 +244,33 @@ class LiveSession:
         self._journal.write(record)
         if phase == Phase.TRAIN:
             self._classroom.method.reset()  # who learns by laps learns now
-            self._count_lap(tally, record)
+            self.board.end_lap(tally, record)
         return record
 
-    def _look(
-        self, step: Step | None, method: Method, drive: Drive | None, phase: Phase, tally: Tally, began_s: float
-    ) -> bool:
+    def _look(self, step: Step | None, method: Method, drive: Drive | None, lap: tuple[Phase, Tally, float]) -> bool:
         """Whether the lap is over, after this step; a twin's robot is put back after a crash in training."""
-        helped = step is not None and step.lesson.choice.driver == Driver.HUMAN
-        if phase != Phase.TRAIN and helped:
+        phase, tally, began_s = lap
+        if is_helped(step, phase):
             tally.unfinished += 1
             return True
-        if drive is None or self._arena is None:
+        state = None if drive is None else self.loop.truth()
+        if drive is None or state is None:
             return False
-        state = self.loop.truth()
-        if state is None:
-            return False
-        if np.isfinite(state.lateral_m) and step is not None:
-            tally.lateral_m.append(state.lateral_m)
-        blind = step is None and state.clearance_m < BLIND_M
-        if state.collided or state.lost or blind:
-            tally.collisions += state.collided or blind
-            tally.lost += state.lost
-            if phase != Phase.TRAIN:
-                return True
-            self._state = replace(
-                self._state,
-                collisions=self._state.collisions + (state.collided or blind),
-                lost=self._state.lost + state.lost,
-            )
+        late = self._robot.now() > began_s + drive.limit_s
+        found = fate(state, tally, phase, blind=step is None, late=late)
+        if found is Fate.PUT_BACK:
             self._begin(method, after_crash(drive.episode, state, phase))
-            return False
-        if state.finished:
-            return True
-        late = phase != Phase.TRAIN and self._robot.now() > began_s + drive.limit_s
-        tally.unfinished += late
-        return late
+        return found is Fate.OVER
 
     def _note(self, step: Step, tally: Tally, phase: Phase, number: int) -> None:
-        tally.steps += 1
-        tally.human_steps += step.lesson.choice.driver == Driver.HUMAN
-        stands = phase != Phase.TRAIN and step.proposal.choice.call is Call.FEEDBACK
-        tally.stops += stands
+        count(step, tally, phase)
         layout, steps = self._episode.layout, self._novice.training_steps
         self._journal.note(step, phase=phase, lap=number, layout=layout, training_steps=steps)
         if phase == Phase.TRAIN:
             beginning = step.proposal.choice.driver == Driver.NOBODY
             self._show(Stage.DEMONSTRATION if beginning else Stage.TEACHING)
         else:
-            self._show(self._state.stage)
+            self._show(self.board.stage)
 
     def _step(self, method: Method) -> Step | None:
         step = self.loop.step(method)
@@ -330,7 +280,7 @@ class LiveSession:
             self._reason = reason
         # In a proof on a twin nobody's hand is there to arm it, and nothing is in its way but what it hits.
         stopped = reason in HELD and reason is not Reason.ESTOP
-        if stopped and self._arena is not None and self._state.stage is Stage.PROVING:
+        if stopped and self._arena is not None and self.board.stage is Stage.PROVING:
             self.loop.arm()
         return step
 
@@ -351,14 +301,14 @@ class LiveSession:
         if self._arena is not None:
             self.loop.stand()
             self._arena.reset(episode)
-        self._show(self._state.stage)
+        self._show(self.board.stage)
 
     def _idle(self) -> None:
         """Stand for one period and hear what is asked."""
         if self.service is not None:
             self.service.serve()
         self.loop.stand()
-        self._show(self._state.stage)
+        self._show(self.board.stage)
 
     def _serve(self, method: Method) -> None:
         """Hear what is asked; while it is paused, stand."""
@@ -369,60 +319,20 @@ class LiveSession:
         if self.service is None:
             return
         self.service.serve()
-        while self.service.paused and not self._is_over and self._asked is None:
+        while self.service.paused and not self._is_over() and self._asked is None:
             self._idle()
 
-    # Requests
-
-    def _ask_for_proof(self) -> Answer:
-        if self._state.stage not in (Stage.DEMONSTRATION, Stage.TEACHING):
-            return False, "nothing is taught now"
-        if not self._novice.trained:
-            return False, "it has learned nothing yet"
-        self._asked = Request.PROVE
-        return True, "the novice alone, to prove what it can: hands off"
-
     def _undo(self) -> Answer:
-        if self._state.stage not in (Stage.DEMONSTRATION, Stage.TEACHING, Stage.VERDICT):
-            return False, "not now: while it is taught, or at the verdict"
         done, words = self._classroom.undo(self._journal.ledger)
         if done:
             if self.service is not None:
                 self.service.change_method(self._classroom.method)
-            if self._state.stage is not Stage.VERDICT:
+            if self.board.stage in TAUGHT:
                 self._asked = Request.UNDO  # the lap begins anew, with who has unlearned
         return done, words
-
-    # What is told
 
     def _layout(self, number: int) -> int:
         return 0 if self._course is None else self._course.taught(number)[0].episode.layout
 
-    def _count_lap(self, tally: Tally, record: LapRecord) -> None:
-        alone = 1.0 - tally.human_steps / max(1, tally.steps)
-        curve = (*self._state.curve, alone)[-100:]
-        self._state = replace(self._state, passed=self._state.passed + record.passed, curve=curve)
-        self._say(
-            f"lap {record.lap}: {'passed' if record.passed else 'not passed'}, {alone:.0%} driven without you, "
-            f"collisions {record.collisions}, lost {record.lost}, {record.human_labels} labels of yours"
-        )
-
     def _show(self, stage: Stage) -> None:
-        """Tell how it goes, at once if the stage is another one, else now and then."""
-        now_s = time.monotonic()
-        if stage is self._state.stage and now_s < self._shown_s + REPORT_S:
-            return
-        self._shown_s = now_s
-        ledger = self._journal.ledger
-        account, labels = ledger.account, ledger.labels
-        self._state = replace(
-            self._state,
-            stamp_s=self._robot.now(),
-            stage=stage,
-            layout=self._episode.layout,
-            labels=labels.stored_human + labels.demonstration,
-            calls=account.call_episodes,
-            answered=account.answered,
-            alone=1.0 - account.human_steps / account.steps if account.steps else 0.0,
-        )
-        self._publish(self._state)
+        self.board.show(stage, self._episode.layout)
