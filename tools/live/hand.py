@@ -4,7 +4,7 @@ import time
 
 from lira.hal.bus.bus import Bus
 from lira.hal.bus.topics import APPLIED
-from lira.hal.messages import Source
+from lira.hal.messages import Applied, Source
 
 
 class Hand:
@@ -17,6 +17,9 @@ class Hand:
     def holds(self) -> bool:
         """Whether a hand drives now."""
         newest = self._applied.newest()
-        if newest is None or time.monotonic() - newest.arrived_s > APPLIED.max_age_s:
-            return False
-        return newest.message.source is Source.TELEOP
+        return newest is not None and is_by_hand(newest.message, time.monotonic() - newest.arrived_s)
+
+
+def is_by_hand(applied: Applied, age_s: float) -> bool:
+    """Whether a hand drives, as it was told so long ago."""
+    return applied.source is Source.TELEOP and age_s <= APPLIED.max_age_s
