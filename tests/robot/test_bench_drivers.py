@@ -2,8 +2,9 @@ import numpy as np
 import pytest
 
 from lira.robot.rplidar.points import NOTHING, Points
-from lira.tools.bench import drivers, scan_age
-from lira.tools.bench.devices import COUNT, FIRST_MM, UNITS, Journal
+from lira.tools.bench import drivers
+from lira.tools.bench.parts import scan_age
+from lira.tools.bench.parts.devices import COUNT, FIRST_MM, UNITS, Journal
 
 
 def test_ultra_streams_are_parsed_without_loss_for_a_small_share_of_a_core(monkeypatch):

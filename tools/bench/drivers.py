@@ -18,8 +18,8 @@ from lira.sim_backend.emulators.core2 import Core2Unit, Firmware
 from lira.sim_backend.emulators.rplidar import RplidarUnit
 from lira.sim_backend.emulators.rplidar_models import DENSE_MODE, Model
 from lira.tools.bench import Row
-from lira.tools.bench.devices import UNITS
-from lira.tools.bench.scan_age import endurance, live
+from lira.tools.bench.parts.devices import UNITS
+from lira.tools.bench.parts.scan_age import endurance, live
 
 RUNS = 5
 STREAM_S = 10.0

@@ -22,7 +22,7 @@ from lira.robot.rplidar.protocol import Answer
 from lira.robot.settings import LidarSettings
 from lira.sim_backend.emulators.rplidar_head import behind
 from lira.tools.bench import Row
-from lira.tools.bench.devices import COUNT, FIRST_MM, UNITS, Journal, devices
+from lira.tools.bench.parts.devices import COUNT, FIRST_MM, UNITS, Journal, devices
 from lira.tools.launch.processes import ChildProcess, free_port, lira_command
 
 SEAM_TURNS = 0.5  # behind the robot
