@@ -9,7 +9,6 @@ import os
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import replace
-from itertools import groupby
 from pathlib import Path
 
 from lira.fusion.log.label_file import Demonstration, Format, read_format
@@ -17,17 +16,26 @@ from lira.fusion.log.label_log import read_demonstrations, read_records
 from lira.fusion.log.label_salvage import lock, survey
 from lira.hal.errors import ConfigError, StorageError
 
+PAUSE_S = 1.0  # two decisions of the slowest robot; a hand that was off for so long has come back
+
 
 def last_intervention(labels: Sequence[Demonstration]) -> list[int]:
-    """Numbers of the stored labels of the last time the human drove; none if there was none.
+    """Numbers of the stored labels of the last time the human drove and any was stored; none if there was none.
 
-    A label's number is its place in the log, from 0. Labels of one intervention follow each other without another
-    source's between them, in one run and lap.
+    A label's number is its place in the log, from 0. The human's labels are of one intervention while they follow each
+    other in one run and lap, no expert's was stored between them, and none came later than `PAUSE_S` after the last.
     """
-    kept = [(number, label) for number, label in enumerate(labels) if label.stored]
-    runs = groupby(kept, key=lambda each: (each[1].source == "human", each[1].run, each[1].lap))
-    interventions = [[number for number, _ in members] for (human, _, _), members in runs if human]
-    return interventions[-1] if interventions else []
+    interventions: list[list[int]] = [[]]
+    last: Demonstration | None = None
+    for number, label in enumerate(labels):
+        if label.source != "human":
+            last = None if label.stored else last
+            continue
+        if last is None or (label.run, label.lap) != (last.run, last.lap) or label.stamp_s > last.stamp_s + PAUSE_S:
+            interventions.append([])
+        interventions[-1] += [number] if label.stored else []
+        last = label
+    return next((numbers for numbers in reversed(interventions) if numbers), [])
 
 
 def correct(path: Path, numbers: Sequence[int], *, stored: bool) -> list[Demonstration]:

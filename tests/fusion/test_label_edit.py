@@ -145,6 +145,11 @@ class TestLastIntervention:
         assert last_intervention(labels[:3]) == [0, 1]
         assert last_intervention(labels[2:3]) == []
 
+    def test_a_hand_that_was_off_for_a_while_has_come_back(self):
+        labels = [label(0), label(1), label(20), label(21, "camera", stored=False), label(22, stored=False), label(26)]
+        assert last_intervention(labels) == [2, 5]
+        assert last_intervention([*labels, label(40, stored=False)]) == [2, 5]
+
     def test_it_ends_with_the_lap(self):
         assert last_intervention([label(0), label(1, lap=2), label(2, lap=2)]) == [1, 2]
 

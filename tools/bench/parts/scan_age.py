@@ -19,7 +19,7 @@ from lira.robot.rplidar.device import RPLidar
 from lira.robot.rplidar.points import PARSERS, Parser, Points
 from lira.robot.settings import LidarSettings
 from lira.tools.bench import Row
-from lira.tools.bench.devices import COUNT, FIRST_MM, MODES, Journal, devices
+from lira.tools.bench.parts.devices import COUNT, FIRST_MM, MODES, Journal, devices
 from lira.tools.launch.processes import ChildProcess, free_port, lira_command
 
 RATE_HZ = 10.0  # of the emulated head

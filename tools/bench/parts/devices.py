@@ -1,6 +1,6 @@
 """The robot's lidar and base on pseudo-terminals, in a process of their own: as on the robot, their time is not ours.
 
-`python -m lira.tools.bench.devices FOLDER MODE` says `ready`, and once told to stop it writes `journal.json`.
+`python -m lira.tools.bench.parts.devices FOLDER MODE` says `ready`, and once told to stop it writes `journal.json`.
 """
 
 import json
@@ -87,7 +87,7 @@ class Devices:
 @contextmanager
 def devices(folder: Path, mode: str) -> Iterator[Devices]:
     """Start the process, with a lidar that offers `mode` and the standard one."""
-    command = [sys.executable, "-m", "lira.tools.bench.devices", str(folder), mode]
+    command = [sys.executable, "-m", "lira.tools.bench.parts.devices", str(folder), mode]
     with ChildProcess("the devices", command, folder / "devices.log") as child:
         child.wait_ready("ready", READY_S)
         yield Devices(folder, child)
