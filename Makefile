@@ -6,7 +6,7 @@ SEEDS := 10
 WORKERS := 2
 TEST_WORKERS := 6
 EXPERTS := $(foreach task,line eight passage garden corridor,camera:--task:$(task)) \
-  $(foreach task,line passage garden,lidar:--task:$(task))
+  $(foreach task,line passage garden,lidar:--task:$(task)) depth:--task:table-top
 BENCHES := twin lockstep latency train preprocess step log drivers takeover
 
 .DEFAULT_GOAL := help
@@ -34,7 +34,7 @@ test: setup ## every test: most beside each other, then those that need the mach
 	$(BIN)/python -m pytest --alone
 
 test-fast: setup ## the unit tests, in under a minute
-	$(BIN)/python -m pytest -m unit --numprocesses 2 --dist worksteal
+	$(BIN)/python -m pytest -m unit
 
 check: setup ## ruff, mypy (strict), who may import whom
 	$(BIN)/ruff check .

@@ -29,7 +29,7 @@ from lira.hal.messages import (
     Twist,
 )
 from lira.hal.profile import load_profile
-from lira.tools.bench import null_robot
+from lira.tools.bench.parts import null_robot
 from lira.tools.bench.takeover import policy
 from lira.tools.console import sound
 from lira.tools.console.keyboard import keyboard_mapping, pad_of
@@ -225,7 +225,7 @@ sys.exit(main(sys.argv[1:]))
 @contextlib.contextmanager
 def null_robot_on_the_bus(tmp_path):
     name, endpoint = f"console{os.getpid()}", f"127.0.0.1:{free_port()}"
-    robot = [sys.executable, "-m", "lira.tools.bench.null_robot", name, endpoint]
+    robot = [sys.executable, "-m", "lira.tools.bench.parts.null_robot", name, endpoint]
     with ChildProcess("the robot", robot, tmp_path / "lira.robot.log") as server:
         server.wait_ready(null_robot.READY, 30.0)
         yield name, endpoint
@@ -312,7 +312,7 @@ def test_the_keys_ask_and_say_that_nobody_answers(tmp_path):
 
 def test_the_keyboard_drives_locks_without_the_focus_and_comes_back(tmp_path):
     name, endpoint = f"keys{os.getpid()}", f"127.0.0.1:{free_port()}"
-    robot = [sys.executable, "-m", "lira.tools.bench.null_robot", name, endpoint]
+    robot = [sys.executable, "-m", "lira.tools.bench.parts.null_robot", name, endpoint]
     with contextlib.ExitStack() as stack:
         server = stack.enter_context(ChildProcess("the robot", robot, tmp_path / "lira.robot.log"))
         server.wait_ready(null_robot.READY, 30.0)

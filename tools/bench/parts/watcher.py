@@ -1,6 +1,6 @@
 """A console without a window: looks at everything on the bus as often as `lira console` draws.
 
-python -m lira.tools.bench.watcher NAME HOST:PORT
+python -m lira.tools.bench.parts.watcher NAME HOST:PORT
 """
 
 import sys
