@@ -1,4 +1,4 @@
-"""The novice of `fusion/kernel.py`: it learns from each label at once, and says how sure it is."""
+"""The novice of `policies/kernel.py`: it learns from each label at once, and says how sure it is."""
 
 import math
 
