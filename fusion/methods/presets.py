@@ -27,6 +27,7 @@ from lira.fusion.methods.shared_feedback import SharingSettings
 from lira.fusion.methods.syllabus import FRESH, THESIS, Syllabus
 from lira.fusion.policies.kernel import KernelSettings
 from lira.hal.errors import ConfigError, PluginError
+from lira.hal.messages import Phase
 from lira.hal.plugins import METHODS as DOOR
 
 
@@ -154,6 +155,7 @@ PLUS = (
     _plus("plus-no-cleaning", kernel=KernelSettings(contradicts=None)),
     _plus("plus-no-gain", kernel=KernelSettings(gain=1.0)),
     _plus("plus-network", kernel=None),
+    _plus("plus-practice", approach=PlusSettings(practice=True)),
     _plus("plus-sure", approach=PlusSettings(sure=0.25)),
     _plus("plus-ask", approach=PlusSettings(ask=True)),
     _plus("plus-own", syllabus=THESIS),
@@ -171,7 +173,7 @@ RIVALS = (
 HG_DAGGER = (
     Preset("hg-dagger-m10", _HG, _M10, trunks="scratch"),
     Preset("hg-dagger-mirrored", _HG, trunks="scratch", mirrored=True),
-    Preset("hg-dagger-doubt", HgDaggerSettings(doubt=("unseen",)), trunks="scratch"),
+    Preset("hg-dagger-doubt", HgDaggerSettings(doubt=(Phase.UNSEEN,)), trunks="scratch"),
     Preset("hg-dagger-trunks", _HG),
     Preset("hg-dagger-warm", _HG, warm=_BOTH),
     Preset("hg-dagger-warm-m10", _HG, _M10, warm=_BOTH),
