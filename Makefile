@@ -34,7 +34,7 @@ test: setup ## every test: most beside each other, then those that need the mach
 	$(BIN)/python -m pytest --alone
 
 test-fast: setup ## the unit tests, in under a minute
-	$(BIN)/python -m pytest -m unit --numprocesses 2 --dist worksteal
+	$(BIN)/python -m pytest -m unit
 
 check: setup ## ruff, mypy (strict), who may import whom
 	$(BIN)/ruff check .

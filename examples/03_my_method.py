@@ -19,7 +19,7 @@ class FarFromAll(lira.Method):
         a_n = self.novice.act(features)
         away = min(abs(a_n[1] - expert.act(features)[1]) for expert in self.experts)
         own = lira.Choice(lira.Driver.NOVICE, a_n, call=lira.Call.FEEDBACK if away > self.far else lira.Call.NONE)
-        choice = own if self.novice.trained else lira.Choice(lira.Driver.HUMAN, (0.0, 0.0))
+        choice = own if self.novice.trained else lira.Choice(lira.Driver.NOBODY, (0.0, 0.0))
         return lira.Proposal(features, choice, a_n, speed=0.3 if away > self.far else 1.0)
 
 

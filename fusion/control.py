@@ -138,7 +138,7 @@ class ControlLoop:
 
     def _driving_policy(self, method: Method, proposal: Proposal) -> Policy | None:
         driver = proposal.choice.driver
-        return None if driver == Driver.HUMAN else method.policy(driver)
+        return None if driver == Driver.NOBODY else method.policy(driver)
 
     def _teach(self, action: Action | None, answers: int) -> None:
         """Drive for the scripted teacher through the same input that a gamepad uses."""

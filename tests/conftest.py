@@ -13,6 +13,7 @@ import signal
 import sys
 import tempfile
 from collections.abc import Generator, Iterator
+from pathlib import Path
 
 import pytest
 from hypothesis import settings
@@ -30,6 +31,7 @@ settings.load_profile("steady")
 EXPECTED_SKIPS = {
     "over the bus in real time the answer is a step behind",
     "in lockstep silence stops time",
+    "no package index answers",
 }
 OPEN = "lira/open"  # in pytest's cache: what failed in the crowd
 MOST_OPEN = 20
@@ -46,6 +48,12 @@ def pytest_configure(config: pytest.Config) -> None:
     """Keep a worker to itself."""
     if hasattr(config, "workerinput") and sys.platform == "linux":
         take_own_loopback()
+
+
+def pytest_ignore_collect(collection_path: Path, config: pytest.Config) -> bool | None:
+    """With `-m unit` do not even import what is none: that takes longer than the unit tests."""
+    asked, is_test = config.getoption("markexpr"), collection_path.match("test_*.py")
+    return True if asked == "unit" and is_test and kind_of(collection_path) != "unit" else None
 
 
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:

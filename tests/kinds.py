@@ -21,6 +21,7 @@ PROCESSES = (
     "lira.robot.supervisor",
     "lira.tools.bench",
     "lira.tools.launch",
+    "lira.tools.web.server",
     "lira.sim_backend.emulators.wire",
     "lira.fusion.learning.trainer",
     "multiprocessing",

@@ -90,7 +90,8 @@ class Ledger:
         before = Call.NONE if self._last is None else self._last.call
         self.calls += before is not choice.call
         self._count["call_steps"] += 1
-        self._count["slowed_steps"] += choice.call is Call.FEEDBACK and choice.driver != Driver.HUMAN
+        moves = choice.driver not in (Driver.HUMAN, Driver.NOBODY)
+        self._count["slowed_steps"] += choice.call is Call.FEEDBACK and moves
         if before is Call.NONE or not self._unanswered:
             self._count["call_episodes"] += 1
             self._unanswered = [end_s for end_s in self._unanswered if end_s >= now_s - ANSWER_S] + [now_s]

@@ -63,7 +63,7 @@ class Journal:
         choice, features = step.lesson.choice, step.proposal.features
         self._keep_labels(step, lap)
         if phase == Phase.TRAIN:
-            demonstrating = step.proposal.choice.driver == Driver.HUMAN
+            demonstrating = step.proposal.choice.driver == Driver.NOBODY
             self.ledger.note(step.lesson, now_s=step.observation.stamp_s, demonstrating=demonstrating)
         decision = self._decision(step, phase, lap, training_steps)
         self._publish(decision)

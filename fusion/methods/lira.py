@@ -150,4 +150,4 @@ class LiraSpf(Method):
         """Before the first training step the novice knows nothing: the human is asked to drive."""
         if self.settings.start == "experts":
             return Choice(Driver.MEAN, mean(a), label=mean(a))
-        return Choice(Driver.HUMAN, STAND, call=Call.FEEDBACK)
+        return Choice(Driver.NOBODY, STAND, call=Call.FEEDBACK)

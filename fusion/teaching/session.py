@@ -10,7 +10,6 @@ from lira.fusion.control import HELD, ControlLoop, Step, Teacher
 from lira.fusion.log.recorder import Journal
 from lira.fusion.log.run_log import LapRecord, ResultRecord
 from lira.fusion.methods.base import Alone, Method
-from lira.fusion.methods.shield import DRIVER as SHIELD
 from lira.hal.errors import DeviceError
 from lira.hal.messages import Call, CourseState, Driver, Episode, Phase
 from lira.hal.port import Arena, Robot
@@ -238,7 +237,7 @@ class Session:
             )
             tally.steps += 1
             tally.human_steps += step.lesson.choice.driver == Driver.HUMAN
-            tally.shielded += step.proposal.choice.driver == SHIELD
+            tally.shielded += step.proposal.choice.driver == Driver.SHIELD
             stands = phase != Phase.TRAIN and step.proposal.choice.call is Call.FEEDBACK
             tally.stops += stands and not stood
             stood = stands

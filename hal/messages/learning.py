@@ -12,7 +12,8 @@ class Driver(StrEnum):
     HUMAN = "human"
     NOVICE = "novice"
     MEAN = "mean"  # of the experts that agree
-    NOBODY = "none"
+    SHIELD = "shield"  # a turn of the novice's that would have touched something, made clear
+    NOBODY = "none"  # it stands and waits for a person
 
 
 class Call(StrEnum):

@@ -48,7 +48,7 @@ def train(method):
 
 def test_before_the_first_training_step_it_stands_and_asks_the_human_to_drive(method):
     choice = method.propose(FEATURES).choice
-    assert (choice.driver, choice.action, choice.label, choice.call) == ("human", STAND, None, Call.FEEDBACK)
+    assert (choice.driver, choice.action, choice.label, choice.call) == ("none", STAND, None, Call.FEEDBACK)
 
 
 def test_afterwards_the_novice_drives_and_nobody_is_called(method):

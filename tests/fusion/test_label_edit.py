@@ -145,6 +145,11 @@ class TestLastIntervention:
         assert last_intervention(labels[:3]) == [0, 1]
         assert last_intervention(labels[2:3]) == []
 
+    def test_a_hand_that_was_off_for_a_while_has_come_back(self):
+        labels = [label(0), label(1), label(20), label(21, "camera", stored=False), label(22, stored=False), label(26)]
+        assert last_intervention(labels) == [2, 5]
+        assert last_intervention([*labels, label(40, stored=False)]) == [2, 5]
+
     def test_it_ends_with_the_lap(self):
         assert last_intervention([label(0), label(1, lap=2), label(2, lap=2)]) == [1, 2]
 
@@ -187,3 +192,12 @@ class TestMerge:
 def test_the_records_themselves_can_be_read(log):
     correct(log, [0], stored=False)
     assert [each.correction for each in read_records(log)] == [False] * 6 + [True]
+
+
+def test_what_is_no_file_is_refused_at_once(tmp_path):
+    os.mkfifo(tmp_path / "pipe")
+    for path in (tmp_path / "pipe", tmp_path, tmp_path / "none"):
+        with pytest.raises(StorageError):
+            correct(path, [0], stored=False)
+        with pytest.raises(StorageError):
+            merge(path, path, tmp_path / "c")

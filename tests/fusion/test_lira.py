@@ -204,7 +204,7 @@ def test_a_feedback_call_slows_both_components_and_learns_nothing():
 def test_before_the_first_training_step_the_human_is_asked_to_drive():
     lira = make_lira({"camera": STRAIGHT, "lidar": STRAIGHT}, PRESETS["hold"], trained=False)
     proposal = run(lira, 1)[0]
-    assert (proposal.choice.driver, proposal.command, proposal.choice.call) == ("human", (0.0, 0.0), Call.FEEDBACK)
+    assert (proposal.choice.driver, proposal.command, proposal.choice.call) == ("none", (0.0, 0.0), Call.FEEDBACK)
     lira = make_lira({"camera": STRAIGHT, "lidar": STRAIGHT}, LiraSettings(start="experts"), trained=False)
     proposal = run(lira, 1)[0]
     assert (proposal.choice.driver, proposal.choice.label) == ("mean", (1.0, 0.0))

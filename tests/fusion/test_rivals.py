@@ -46,7 +46,7 @@ def test_before_it_has_learned_anything_the_person_drives_and_no_rule_is_asked()
     method = Switch(novice)
     method.over = True
     proposal = method.propose(FEATURES)
-    assert (proposal.choice.driver, proposal.command, proposal.choice.call) == ("human", STAND, Call.FEEDBACK)
+    assert (proposal.choice.driver, proposal.command, proposal.choice.call) == ("none", STAND, Call.FEEDBACK)
 
 
 def test_it_stands_and_calls_until_the_person_is_needed_no_longer():

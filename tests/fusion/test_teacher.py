@@ -44,7 +44,7 @@ class Crystal:
     def set_layout(self, layout):
         self.layouts.append(layout)
 
-    def rollout(self, state, policy, steps, period_s):
+    def rollout(self, state, policy, steps, period_s, ends):
         self.rollouts += 1
         return [replace(state, x_m=state.x_m + 0.2, collided=self.danger)]
 

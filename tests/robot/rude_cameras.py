@@ -6,6 +6,7 @@ import socket
 import struct
 import threading
 import time
+from fractions import Fraction
 
 import cv2
 import numpy as np
@@ -146,6 +147,7 @@ class Packets(io.RawIOBase):
         return len(data)
 
 
+TICKS_HZ = 90_000  # of RTP
 SDP = (
     "v=0\r\no=- 0 0 IN IP4 127.0.0.1\r\ns=x\r\nt=0 0\r\n"
     "m=video 0 RTP/AVP 96\r\na=rtpmap:96 H264/90000\r\na=control:0\r\n"
@@ -184,13 +186,15 @@ def play(server, connection, size, rate_hz, stall):
     options = {"tune": "zerolatency", "preset": "ultrafast", "g": "15", "x264-params": "repeat-headers=1"}
     video = container.add_stream("libx264", rate=rate_hz, options=options)
     video.width, video.height, video.pix_fmt = *size, "yuv420p"
+    video.codec_context.time_base = Fraction(1, TICKS_HZ)
     start_s = time.monotonic()
     number = 0
     while not server.stop.is_set():
         number += 1
         server.stop.wait(max(start_s + number / rate_hz - time.monotonic(), 0.0))
-        frame = av.VideoFrame.from_ndarray(clock_picture(size, time.monotonic()), format="rgb24")
-        frame.pts = number
+        now_s = time.monotonic()
+        frame = av.VideoFrame.from_ndarray(clock_picture(size, now_s), format="rgb24")
+        frame.pts, frame.time_base = round((now_s - start_s) * TICKS_HZ), Fraction(1, TICKS_HZ)
         for packet in video.encode(frame):
             container.mux(packet)
         if stall is not None and stall.is_set():

@@ -1,10 +1,13 @@
+import ctypes
+import os
 import subprocess
 import sys
 
 import pytest
 
 from lira.hal.errors import DeviceError
-from lira.tools.joystick.axes import AxisRange, PadState
+from lira.tools.joystick.axes import AxisRange, PadEvent, PadState
+from lira.tools.joystick.event_device import EVENT, EventDevice
 from lira.tools.joystick.finder import choose
 from lira.tools.joystick.mapping import load_mapping
 from lira.tools.joystick.nodes import Node, is_any_pad, motion_of, parse_bitmap, read_nodes
@@ -164,3 +167,80 @@ def test_an_unknown_pad_is_refused_before_a_robot_is_looked_for():
     done = subprocess.run(command, check=False, capture_output=True, text=True, timeout=60)
     assert done.returncode == 2
     assert "unknown pad 'nosuch'" in done.stderr
+
+
+class Replay(ctypes.Structure):
+    _fields_ = (("length", ctypes.c_uint16), ("delay", ctypes.c_uint16))
+
+
+class Periodic(ctypes.Structure):
+    """The largest of the kernel's effects; it decides the size of all."""
+
+    _fields_ = (
+        ("waveform", ctypes.c_uint16), ("period", ctypes.c_uint16), ("magnitude", ctypes.c_int16),
+        ("offset", ctypes.c_int16), ("phase", ctypes.c_uint16), ("envelope", ctypes.c_uint16 * 4),
+        ("custom_len", ctypes.c_uint32), ("custom_data", ctypes.c_void_p),
+    )  # fmt: skip
+
+
+class RumbleEffect(ctypes.Structure):
+    _fields_ = (("strong", ctypes.c_uint16), ("weak", ctypes.c_uint16))
+
+
+class AnyEffect(ctypes.Union):
+    _fields_ = (("periodic", Periodic), ("rumble", RumbleEffect))
+
+
+class Effect(ctypes.Structure):
+    """struct ff_effect of linux/input.h."""
+
+    _fields_ = (
+        ("type", ctypes.c_uint16), ("id", ctypes.c_int16), ("direction", ctypes.c_uint16),
+        ("trigger", ctypes.c_uint16 * 2), ("replay", Replay), ("u", AnyEffect),
+    )  # fmt: skip
+
+
+def test_a_rumble_is_what_the_kernel_takes(tmp_path, monkeypatch):
+    asked = []
+
+    def ioctl(_, request, argument):
+        asked.append((request, argument))
+        if isinstance(argument, bytearray):
+            effect = Effect.from_buffer(argument)
+            assert (effect.type, effect.id, effect.replay.length, effect.replay.delay) == (0x50, -1, 800, 0)
+            assert (effect.u.rumble.strong, effect.u.rumble.weak) == (40_000, 40_000)
+            effect.id = 7
+        return 0
+
+    monkeypatch.setattr("lira.tools.joystick.event_device.fcntl.ioctl", ioctl)
+    path = tmp_path / "event5"
+    path.touch()
+    device = EventDevice(str(path))
+    assert device.upload_rumble(40_000, 800) == 7
+    device.play(7, True)
+    device.erase(7)
+    device.close()
+    (upload, effect), (erase, number) = asked
+    assert (upload, len(effect)) == (1 << 30 | ctypes.sizeof(Effect) << 16 | 0x4580, ctypes.sizeof(Effect))
+    assert (erase, number) == (0x40044581, 7)
+    *_, kind, code, value = EVENT.unpack(path.read_bytes())
+    assert (kind, code, value) == (0x15, 7, 1)
+
+
+def test_a_device_that_may_only_be_read_is_opened_for_reading(tmp_path, monkeypatch):
+    path = tmp_path / "event5"
+    path.write_bytes(EVENT.pack(0, 0, 3, 1, 200) + b"half an event")
+    real = os.open
+
+    def refuse_writing(name, flags, *more):
+        if flags & os.O_RDWR:
+            raise PermissionError(13, "Permission denied")
+        return real(name, flags, *more)
+
+    monkeypatch.setattr("lira.tools.joystick.event_device.os.open", refuse_writing)
+    device = EventDevice(str(path))
+    assert device.read() == [PadEvent(3, 1, 200)]
+    with pytest.raises(EOFError):
+        device.read()
+    device.close()
+    device.close()

@@ -50,7 +50,19 @@ def measure(layout: int) -> dict[str, float]:
     """Drive one layout and return how many simulated seconds went by per second, and what was done in them."""
     port = free_port()
     name, endpoint = f"bench_{port}", f"127.0.0.1:{port}"
-    words = ["--name", name, "--world", WORLD, "--layout", str(layout), "--listen", endpoint, "--lockstep"]
+    words = [
+        "--name",
+        name,
+        "--world",
+        WORLD,
+        "--layout",
+        str(layout),
+        "--listen",
+        endpoint,
+        "--lockstep",
+        "--renderer",
+        "sketch",
+    ]
     with (
         TemporaryDirectory() as folder,
         ChildProcess("the twin", lira_command("twin", *words), Path(folder) / "twin.log") as twin,

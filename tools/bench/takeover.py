@@ -24,7 +24,8 @@ from lira.hal.bus.topics import APPLIED
 from lira.hal.client.remote import RemoteRobot
 from lira.hal.errors import BusError
 from lira.hal.messages import HELD, STOP, Applied, Command, Source, Twist
-from lira.tools.bench import Row, null_robot
+from lira.tools.bench import Row
+from lira.tools.bench.parts import null_robot
 from lira.tools.joystick.axes import AxisRange, PadEvent, PadState
 from lira.tools.joystick.bridge import Bridge
 from lira.tools.joystick.client import TeleopClient
@@ -85,7 +86,7 @@ def run() -> list[Row]:
     """Return one row."""
     port = free_port()
     name, endpoint = f"bench_{port}", f"127.0.0.1:{port}"
-    robot = [sys.executable, "-m", "lira.tools.bench.null_robot", name, endpoint]
+    robot = [sys.executable, "-m", "lira.tools.bench.parts.null_robot", name, endpoint]
     with TemporaryDirectory() as folder, ChildProcess("the robot", robot, Path(folder) / "lira.robot.log") as server:
         server.wait_ready(null_robot.READY, READY_S)
         taken_ms = measure(name, endpoint)

@@ -21,7 +21,7 @@ def pad(patient: Patient) -> list[Finding]:
     finder = Finder(None, patient.device)
     device = finder()
     if device is None:
-        return [fail(finder.advice(), "", pad="")]
+        return [fail(finder.advice(), "See /proc/bus/input/devices for what the kernel knows.", pad="")]
     try:
         states, reports = _listen(device, min(LISTEN_S, patient.seconds))
     finally:

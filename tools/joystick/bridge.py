@@ -1,9 +1,11 @@
 """The bridge's loop: read the pad, let the hand decide, send, keep time. No step of it waits for the network."""
 
+import math
 import select
 import threading
 import time
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Protocol
 
 from lira.hal.errors import DeviceError
@@ -15,7 +17,10 @@ from lira.tools.joystick.freeze import FreezeWatch
 from lira.tools.joystick.known_pads import PadMemory
 from lira.tools.joystick.mapping import Mapping, load_mapping
 from lira.tools.joystick.requests import RequestButtons
-from lira.tools.joystick.rumble import CALLS, TAKEN, Rumble, pattern_of
+from lira.tools.joystick.rumble import PATTERNS, TAKEN, Rumble, pattern_of
+from lira.tools.operator.situation import Urgency
+from lira.tools.operator.view import View
+from lira.tools.operator.voice import speak
 
 RATE_HZ = 30.0
 SEARCH_S = 0.3
@@ -88,11 +93,19 @@ class Bridge:
         self._pad: OpenPad | None = None
         self._locked_s = self._due_s  # since when the pad is not at rest
         self._sent = Order(None)
-        self._calls = 0
+        self._view = View(client.robot)
+        self._voice = speak(self._view)
+        self._heard_s = self._decided_s = -math.inf
+        self._urgency = Urgency.CALM
         self._last_words = ""
         self._find()
         if self._pad is None:
             self._tell(self._advice())
+
+    @property
+    def hand(self) -> State:
+        """How the dead-man is."""
+        return self._hand.state
 
     def run(self, stop: threading.Event) -> None:
         """Go on until `stop` is set; then let the robot stand if a hand was on the controls."""
@@ -156,8 +169,8 @@ class Bridge:
         self._order(None if self._pad is None else self._pad.state, now_s, tick=True)
         if self._pad is not None and self._is_alive():
             self._client.show(*_joy(self._pad.state, self._mapping), now_s)
+        self._look(applied, now_s)
         self._feel(now_s)
-        self._explain(applied)
         self._hear(now_s)
 
     def _order(self, state: PadState | None, now_s: float, *, tick: bool = False) -> None:
@@ -237,24 +250,37 @@ class Bridge:
             self._say(f"nobody answers to '{request}': does lira fusion run?")
 
     def _feel(self, now_s: float) -> None:
-        """Rumble for what was asked on `joy/feedback`, and for the learner's calls as they begin."""
+        """Rumble for what was asked on `joy/feedback`, and for whatever needs the person as it begins."""
         for message in self._client.feedback():
             self._rumble.play(pattern_of(message), now_s)
-        for decision in self._client.decisions():
-            if decision.calls > self._calls and decision.call in CALLS:
-                self._rumble.play(CALLS[decision.call], now_s)
-            self._calls = decision.calls
+        if self._voice.urgency is not self._urgency and self._voice.urgency in PATTERNS:
+            self._rumble.play(PATTERNS[self._voice.urgency], now_s)
+        self._urgency = self._voice.urgency
         if self._pad is not None:
             self._pad.rumble(self._rumble.strength(now_s) or 0.0)
 
-    def _explain(self, applied: Applied | None) -> None:
-        """Say why the robot stands though a hand drives."""
-        if applied is None or self._hand.state is not State.DRIVING:
-            return
-        if applied.reason is Reason.NEUTRAL_FIRST:
-            self._tell("the robot waits: centre the sticks once")
-        elif applied.reason is Reason.ESTOP:
-            self._tell(f"the emergency stop is pressed: let go, then hold {self._mapping.release} to release it")
+    def _look(self, applied: Applied | None, now_s: float) -> None:
+        """Bring up to date what is known, and say what to do when that becomes something else."""
+        decisions, newest = self._client.decisions(), applied or self._view.applied
+        if applied is not None:
+            self._heard_s = now_s
+        if decisions:
+            self._decided_s = now_s
+        self._view = replace(
+            self._view,
+            applied=newest,
+            link_age_s=now_s - self._heard_s,
+            decision=decisions[-1] if decisions else self._view.decision,
+            decision_age_s=now_s - self._decided_s,
+            answer=self._client.answer,
+            answer_age_s=now_s - self._client.answered_s,
+            estop=newest is not None and newest.reason is Reason.ESTOP,
+            confirmed=self._client.confirmed,
+            hand=self._hand.state,
+        )
+        before, self._voice = self._voice, speak(self._view)
+        if self._voice.situation is not before.situation and self._voice.urgency in PATTERNS:
+            self._tell(f"{self._voice.who}: {self._voice.why} {self._voice.now}")
 
     def _tell(self, words: str, key: str = "") -> None:
         """Say something, once; what has the same `key` as what was said last is the same."""

@@ -144,7 +144,7 @@ def drivers(run: Run) -> list[tuple[str, str]]:
     seen = {step.decision.driver for _, step in run.steps()}
     known: list[tuple[str, str]] = [(Driver.NOVICE, "novice"), (Driver.HUMAN, "human")]
     known += [(name, f"{name} expert") for name in run.experts]
-    known += [(Driver.MEAN, "mean of the experts"), ("shield", "the shield, instead of the novice")]
+    known += [(Driver.MEAN, "mean of the experts"), (Driver.SHIELD, "the shield, instead of the novice")]
     return [(words, plots.driver_class(name, run.experts)) for name, words in known if name in seen]
 
 

@@ -28,6 +28,7 @@ from lira.hal.messages import Action, Driver
 from lira.hal.profile import RobotProfile, load_profile
 from lira.sim_backend.catalogue import load_world
 from lira.sim_backend.foresight import Foresight, with_small_camera
+from lira.sim_backend.scenes.opening import quickest
 from lira.tools.runs.simulated import simulate
 from lira.tools.runs.teach import telling
 
@@ -44,7 +45,7 @@ def train_expert(kind: str, task: str, profile: RobotProfile, seed: int, path: P
     network = ExpertNet(sees.name, sees.shape(profile), profile.features.filters, seed=seed)
     novice = NetworkNovice(network, InlineTrainer(Learner(network, seed=seed, frozen_trunks=False)), LearningSettings())
     with (
-        simulate(world, profile, seed=seed, renderer="sketch") as robot,
+        simulate(world, profile, seed=seed, renderer=quickest(world)) as robot,
         closing(ScriptedTeacher(Foresight(profile, world), profile, course.teacher, seed)) as teacher,
     ):
         loop = ControlLoop(robot, truth=robot.arena.state)

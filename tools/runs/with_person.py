@@ -20,6 +20,7 @@ from lira.hal.client.remote import RemoteArena, RemoteRobot
 from lira.hal.messages import Episode
 from lira.sim_backend.world import World
 from lira.tools.launch.lifetime import CLOSE_S, saving, stop_or_interrupt
+from lira.tools.operator.voice import explain
 from lira.tools.runs.build import NewTrainer, build_method
 from lira.tools.runs.folder import FLOOR, LABELS, RECORD, snapshot
 from lira.tools.runs.teach import Plan, Publish, Say
@@ -35,7 +36,7 @@ def show_policy(args: argparse.Namespace, robot: RemoteRobot, publish: Publish, 
         service = OperatorService(line, loop, method, journal, say, restart=restarter(robot, args))
         loop.arm()
         say(f"'{args.policy}' drives '{args.name}'; stop with Ctrl-C")
-        serve(loop, method, journal, stop, say, operator_service=service)
+        serve(loop, method, journal, stop, say, operator_service=service, explain=explain)
     return 0
 
 
@@ -80,6 +81,7 @@ def learn_from_person(
                         say,
                         lambda: novice.training_steps,
                         operator_service=service,
+                        explain=explain,
                         layout=args.layout,
                     )
     return 0

@@ -45,8 +45,8 @@ def run(args: argparse.Namespace) -> int:
     from lira.hal.bus.bus import Bus
     from lira.hal.bus.services import LOCKSTEP, info_from_json
     from lira.hal.bus.topics import INFO
-    from lira.tools.console.listen import Ears
     from lira.tools.joystick.client import TeleopClient
+    from lira.tools.operator.listen import Ears
 
     with contextlib.ExitStack() as stack:
         bus = Bus(args.name, connect=args.connect)

@@ -35,4 +35,4 @@ class Cloning(Method):
 
     def propose(self, features: Features) -> Proposal:
         """Ask the human to drive."""
-        return Proposal(features, Choice(Driver.HUMAN, STAND, call=Call.FEEDBACK), self.novice.act(features))
+        return Proposal(features, Choice(Driver.NOBODY, STAND, call=Call.FEEDBACK), self.novice.act(features))

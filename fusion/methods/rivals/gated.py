@@ -48,7 +48,7 @@ class RobotGated(Method):
         """The novice's action, or to stand and call; before its first training step the human is asked to drive."""
         a_n = self.novice.act(features)
         if not self.novice.trained:
-            return Proposal(features, Choice(Driver.HUMAN, STAND, call=Call.FEEDBACK), a_n)
+            return Proposal(features, Choice(Driver.NOBODY, STAND, call=Call.FEEDBACK), a_n)
         if not self._called and not self._human_drove and self.hands_over(features, a_n):
             self._called = True
         if self._called:

@@ -49,7 +49,7 @@ class HgDagger(Method):
         """The novice's action; before its first training step it asks the human to drive."""
         a_n = self.novice.act(features)
         if not self.novice.trained:
-            return Proposal(features, Choice(Driver.HUMAN, STAND, call=Call.FEEDBACK), a_n)
+            return Proposal(features, Choice(Driver.NOBODY, STAND, call=Call.FEEDBACK), a_n)
         return Proposal(features, Choice(Driver.NOVICE, a_n), a_n)
 
     def learn(self, proposal: Proposal, human: Action | None) -> Lesson:

@@ -1,4 +1,4 @@
-"""A bare zenoh echo as a process: `python -m lira.tools.bench.echo HOST:PORT`. No code of ours is in its way."""
+"""A bare zenoh echo as a process: `python -m lira.tools.bench.parts.echo HOST:PORT`. No code of ours is in its way."""
 
 import contextlib
 import sys

@@ -1,4 +1,4 @@
-"""A HAL server as a process, with no robot behind it: `python -m lira.tools.bench.null_robot NAME HOST:PORT`."""
+"""A HAL server as a process, with no robot behind it: `python -m lira.tools.bench.parts.null_robot NAME HOST:PORT`."""
 
 import sys
 import time

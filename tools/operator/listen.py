@@ -1,19 +1,16 @@
-"""The console's ears: the newest of everything on a watching bus, as a view."""
+"""Hears the newest of everything on a watching bus, as a view."""
 
 import math
 import time
 from dataclasses import replace
 from typing import TypeVar
 
-import cv2
-import numpy as np
-
 from lira.hal.bus.bus import Bus
 from lira.hal.bus.reader import Received
-from lira.hal.bus.topics import APPLIED, BATTERY, CAMERA, DECISION, ODOM, OPERATOR_ANSWER, SCAN
-from lira.hal.messages import ByteArray, CompressedImage, Reason
+from lira.hal.bus.topics import APPLIED, BATTERY, CAMERA, DECISION, ODOM, OPERATOR_ANSWER, SCAN, SIM_STATE
+from lira.hal.messages import Reason
 from lira.hal.profile import RobotProfile
-from lira.tools.console.state import View
+from lira.tools.operator.view import View
 
 M = TypeVar("M")
 
@@ -25,9 +22,8 @@ class Ears:
         self._scan, self._camera = watch.reader(SCAN), watch.reader(CAMERA)
         self._odom, self._applied = watch.reader(ODOM), watch.reader(APPLIED)
         self._decision, self._battery = watch.reader(DECISION), watch.reader(BATTERY)
-        self._answer = watch.reader(OPERATOR_ANSWER)
-        self._picture: ByteArray | None = None
-        self._picture_s = -math.inf
+        self._answer, self._truth = watch.reader(OPERATOR_ANSWER), watch.reader(SIM_STATE)
+        self._answered, self._verdict_s = 0, -math.inf
         features, base = profile.features, profile.base
         self._view = View(
             watch.robot,
@@ -40,16 +36,19 @@ class Ears:
         """The view now."""
         scan, odom, applied = self._scan.newest(), self._odom.newest(), self._applied.newest()
         decision, battery, answer = self._decision.newest(), self._battery.newest(), self._answer.newest()
-        for received in self._camera.poll()[-1:]:
-            self._picture, self._picture_s = decode_picture(received.message), received.arrived_s
+        truth, picture = self._truth.newest(), self._camera.newest()
+        if answer is not None and answer.message.count != self._answered:
+            self._answered, self._verdict_s = answer.message.count, answer.arrived_s
         now_s = time.monotonic()
         return replace(
             self._view,
             scan=_message(scan),
             scan_age_s=_age_s(scan, now_s),
-            camera=self._picture,
-            camera_age_s=now_s - self._picture_s,
+            picture=_message(picture),
+            picture_age_s=_age_s(picture, now_s),
             odom=_message(odom),
+            truth=_message(truth),
+            truth_age_s=_age_s(truth, now_s),
             applied=_message(applied),
             link_age_s=_age_s(applied, now_s),
             decision=_message(decision),
@@ -57,17 +56,9 @@ class Ears:
             battery=_message(battery),
             answer=_message(answer),
             answer_age_s=_age_s(answer, now_s),
+            verdict_age_s=now_s - self._verdict_s,
             estop=applied is not None and applied.message.reason is Reason.ESTOP,
         )
-
-
-def decode_picture(image: CompressedImage) -> ByteArray | None:
-    """RGB pixels; None for what is no picture."""
-    try:
-        pixels = cv2.imdecode(np.frombuffer(image.data, np.uint8), cv2.IMREAD_COLOR)
-    except cv2.error:
-        return None
-    return None if pixels is None else np.ascontiguousarray(pixels[..., ::-1], np.uint8)
 
 
 def _message(received: Received[M] | None) -> M | None:

@@ -1,6 +1,6 @@
 """A console without a window: looks at everything on the bus as often as `lira console` draws.
 
-python -m lira.tools.bench.watcher NAME HOST:PORT
+python -m lira.tools.bench.parts.watcher NAME HOST:PORT
 """
 
 import sys
@@ -9,7 +9,7 @@ import time
 from lira.hal.bus.bus import Bus
 from lira.hal.bus.services import info_from_json
 from lira.hal.bus.topics import INFO
-from lira.tools.console.listen import Ears
+from lira.tools.operator.listen import Ears
 
 READY = "watching"
 LOOK_S = 0.05
