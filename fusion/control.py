@@ -124,7 +124,7 @@ class ControlLoop:
             self.refused += 1
             self.trouble = str(error)
             return None
-        silent = [name for name, seen in (("lidar", observation.scan), ("camera", observation.image)) if seen is None]
+        silent = self._preprocess.silent(observation)
         self.trouble = f"nothing new from the {' and the '.join(silent)}" if silent else ""
         return features
 

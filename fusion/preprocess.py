@@ -1,251 +1,184 @@
-"""From raw sensor messages to what the networks see: `bins` ranges and a small gray image, both in [0, 1]."""
+"""From an observation to what the networks see: named arrays, one for each modality that the robot's profile chooses.
 
-import math
+A modality is a row of `MODALITIES`. To learn from one more sensor takes a function in `modalities/` that turns its
+message into an array, a row here, and its name among the `inputs` of a profile.
+"""
+
 from collections import Counter
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import partial
+from typing import Any, Literal
 
-import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from lira.hal.errors import SensorError
-from lira.hal.messages import ByteArray, CompressedImage, FloatArray, Image, LaserScan, Observation
-from lira.hal.messages.ranges import read_ranges
-from lira.hal.profile import Features as FeatureShape
-from lira.hal.profile import RobotProfile
+from lira.fusion.modalities.depth import near_depth
+from lira.fusion.modalities.image import check_light, from_uint8, gray_image, to_uint8
+from lira.fusion.modalities.reading import ReadingError
+from lira.fusion.modalities.scan import bin_scan
+from lira.hal.errors import ConfigError
+from lira.hal.messages import CompressedImage, DepthImage, FloatArray, Image, LaserScan, Observation
+from lira.hal.profile import MAX_BINS, MAX_IMAGE_PX, RobotProfile
 
-# Beam angles arrive as float32, so a beam that lies on the edge between two bins is off by less than this.
-EDGE_BINS = 1e-3
-DARK = 12 / 255  # no pixel brighter than this: a covered lens, a dead sensor, a dark room
-MAX_IMAGE_PX = 8192  # a side; a header that claims more is broken, and decoding it would take gigabytes
-
-_UNIT = (np.arange(256) / 255).astype(np.float32)
-_REDUCED_GRAY = {
-    8: cv2.IMREAD_REDUCED_GRAYSCALE_8,
-    4: cv2.IMREAD_REDUCED_GRAYSCALE_4,
-    2: cv2.IMREAD_REDUCED_GRAYSCALE_2,
-    1: cv2.IMREAD_GRAYSCALE,
-}
-_JPEG_END = b"\xff\xd9"
-_PNG_START = b"\x89PNG\r\n\x1a\n"
-_PNG_END = b"IEND\xaeB`\x82"
+Shape = tuple[int, ...]
+LEAST_PX = 6  # two convolutions and a pooling leave one pixel of it
 
 
-class ReadingError(SensorError):
-    """A reading that cannot be used; `reason` is the short name it is counted under."""
+class Features(Mapping[str, FloatArray]):
+    """What the networks see: arrays by name, float32 in [0, 1], as many as the robot's profile chooses.
 
-    def __init__(self, reason: str, what: str, remedy: str) -> None:
-        super().__init__(what, remedy)
-        self.reason = reason
+    `scan` [bins] and `image` [px, px] unless it says otherwise, and `depth` [px, px] where it does. `seen.scan` and
+    `seen["scan"]` are the same. The last axis runs across what is seen, so that reversing it exchanges left and right.
+    """
+
+    __slots__ = ("_arrays",)
+    _arrays: dict[str, FloatArray]
+
+    def __init__(self, **arrays: FloatArray) -> None:
+        self._arrays = arrays
+
+    def __getitem__(self, name: str) -> FloatArray:
+        return self._arrays[name]
+
+    def __getattr__(self, name: str) -> FloatArray:
+        if name.startswith("_") or name not in self._arrays:
+            raise AttributeError(f"these features have no '{name}', but {' and '.join(self._arrays) or 'nothing'}")
+        return self._arrays[name]
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._arrays)
+
+    def __len__(self) -> int:
+        return len(self._arrays)
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return partial(Features, **self._arrays), ()
+
+    def __repr__(self) -> str:
+        return f"Features({', '.join(f'{name}={array.shape}' for name, array in self.items())})"
+
+    __eq__ = object.__eq__  # arrays have no one answer to it
+    __hash__ = object.__hash__
+
+    def mirrored(self) -> "Features":
+        """Exchange left and right."""
+        return Features(**{name: np.ascontiguousarray(array[..., ::-1]) for name, array in self.items()})
 
 
 @dataclass(frozen=True, slots=True)
-class Features:
-    """What the networks see. `scan`: float32 [bins], `image`: float32 [px, px], both in [0, 1]."""
+class Modality:
+    """One row. `name` is that of the feature and of the observation's field it is made from.
 
-    scan: FloatArray
-    image: FloatArray
+    `sensor` is what measures it, and the name of the expert that sees nothing else. `read` makes the array of a reading
+    and counts what is invalid in it. `trunk` is what part of a network looks at it. A picture is kept in 8 bits, which
+    loses nothing: its values are multiples of 1/255.
+    """
+
+    name: str
+    sensor: str
+    trunk: Literal["scan", "picture"]
+    has: Callable[[RobotProfile], bool]
+    read: Callable[[Any, RobotProfile], tuple[FloatArray, int]]
+
+    @property
+    def dtype(self) -> type[np.float32] | type[np.uint8]:
+        """What its values are kept as."""
+        return np.float32 if self.trunk == "scan" else np.uint8
+
+    def shape(self, profile: RobotProfile) -> Shape:
+        """Shape of its array."""
+        shape = profile.features
+        return (shape.bins,) if self.trunk == "scan" else (shape.image_px, shape.image_px)
+
+    def check(self, shape: Shape) -> None:
+        """Raises `ValueError` for a shape that no robot of ours could have."""
+        if self.trunk == "scan":
+            fits = len(shape) == 1 and 1 <= shape[0] <= MAX_BINS
+        else:
+            fits = len(shape) == 2 and shape[0] == shape[1] and LEAST_PX <= shape[0] <= MAX_IMAGE_PX
+        if not fits:
+            raise ValueError(f"a {self.name} of shape {list(shape)}")
+
+    def keep(self, array: FloatArray) -> NDArray[Any]:
+        """Turn an array into what is kept of it."""
+        return array if self.trunk == "scan" else to_uint8(array)
+
+    def restore(self, kept: NDArray[Any]) -> FloatArray:
+        """Inverse of `keep`, exactly."""
+        return kept.astype(np.float32, copy=False) if self.trunk == "scan" else from_uint8(kept)
+
+
+def _scan(scan: LaserScan, profile: RobotProfile) -> tuple[FloatArray, int]:
+    return bin_scan(scan, profile.features)
+
+
+def _image(image: Image | CompressedImage, profile: RobotProfile) -> tuple[FloatArray, int]:
+    gray = gray_image(image, profile.features.image_px)
+    check_light(gray)
+    return gray, 0
+
+
+def _depth(depth: DepthImage | CompressedImage, profile: RobotProfile) -> tuple[FloatArray, int]:
+    return near_depth(depth, profile.features.image_px, profile.features.max_range_m), 0
+
+
+# In the order in which networks see them and experts are asked.
+MODALITIES = {
+    row.name: row
+    for row in (
+        Modality("image", "camera", "picture", lambda _: True, _image),
+        Modality("scan", "lidar", "scan", lambda _: True, _scan),
+        Modality("depth", "depth", "picture", lambda profile: profile.depth is not None, _depth),
+    )
+}
+
+
+def modalities_of(profile: RobotProfile) -> tuple[Modality, ...]:
+    """The rows that a robot learns from. Raises `ConfigError` for one that is none, or that it has no sensor for."""
+    chosen = profile.features.inputs
+    for name in chosen:
+        if name not in MODALITIES:
+            what = f"features.inputs of '{profile.name}' names '{name}'"
+            raise ConfigError(what, f"Known: {', '.join(MODALITIES)}.")
+        if not MODALITIES[name].has(profile):
+            what = f"'{profile.name}' is to learn from {name}, and has no sensor for it"
+            raise ConfigError(what, f"Give its profile a [{name}] table, or leave it out of features.inputs.")
+    return tuple(row for row in MODALITIES.values() if row.name in chosen)
+
+
+def shapes_of(profile: RobotProfile) -> dict[str, Shape]:
+    """Shapes of a robot's features by name. Raises `ConfigError` as `modalities_of` does."""
+    return {row.name: row.shape(profile) for row in modalities_of(profile)}
 
 
 class Preprocessor:
     """Turns observations into features and counts what it had to leave out.
 
     `invalid_beams` counts beams that read nan, `refused` the readings that could not be used, by reason.
+    Raises `ConfigError` for a profile with inputs that its robot does not have.
     """
 
     def __init__(self, profile: RobotProfile) -> None:
-        self._shape = profile.features
+        self._profile = profile
+        self._modalities = modalities_of(profile)
         self.invalid_beams = 0
         self.refused: Counter[str] = Counter()
 
     def __call__(self, observation: Observation) -> Features | None:
         """Return the features, or None while a sensor is absent or stale. Raises `SensorError` after counting it."""
-        if observation.scan is None or observation.image is None:
+        if self.silent(observation):
             return None
-        try:
-            scan, invalid = bin_scan(observation.scan, self._shape)
-            image = gray_image(observation.image, self._shape.image_px)
-            _check_light(image)
-        except ReadingError as error:
-            self.refused[error.reason] += 1
-            raise
-        self.invalid_beams += invalid
-        return Features(scan, image)
+        arrays: dict[str, FloatArray] = {}
+        for row in self._modalities:
+            try:
+                arrays[row.name], invalid = row.read(getattr(observation, row.name), self._profile)
+            except ReadingError as error:
+                self.refused[error.reason] += 1
+                raise
+            self.invalid_beams += invalid
+        return Features(**arrays)
 
-
-def bin_scan(scan: LaserScan, shape: FeatureShape) -> tuple[FloatArray, int]:
-    """Crop a scan to the field of view ahead, bin it and normalise it.
-
-    Returns float32 [bins] (counter-clockwise, the nearest return of each bin over `max_range_m`; 1.0: no return,
-    0.0: too close) and the number of invalid beams. A bin without a valid beam takes its nearest neighbour's value.
-    Which beams are valid, too close or without a return is as `hal.ranges` has it.
-    Raises `SensorError` for a scan that does not cover the field of view or that is invalid in most of it.
-    """
-    if np.ndim(scan.ranges) != 1:
-        raise ReadingError(
-            "scan shape", f"the scan has {np.ndim(scan.ranges)} dimensions instead of 1", "Check the lidar driver."
-        )
-    layout = _layout(len(scan.ranges), scan.angle_min, scan.angle_increment, shape.fov_rad, shape.bins)
-    beams = read_ranges(scan, layout.beams)
-    invalid = int(np.count_nonzero(np.isnan(beams)))
-    nearest = np.full(shape.bins, np.nan, dtype=np.float32)
-    nearest[layout.bins] = np.fmin.reduceat(beams, layout.starts)
-    if invalid or layout.bins.size < shape.bins:
-        nearest = _fill(nearest)
-    return np.clip(nearest / np.float32(shape.max_range_m), 0.0, 1.0), invalid
-
-
-@dataclass(frozen=True, slots=True)
-class _Layout:
-    """Which beams fall into which bins: `beams` sorted by bin, `starts` of each group in it, `bins` of the groups."""
-
-    beams: NDArray[np.intp]
-    starts: NDArray[np.intp]
-    bins: NDArray[np.intp]
-
-
-@lru_cache(maxsize=16)
-def _layout(count: int, angle_min: float, increment: float, fov_rad: float, bins: int) -> _Layout:
-    """Sort the beams of a scan into bins. Raises `SensorError` where they do not cover the field of view."""
-    remedy = "Compare the lidar's settings with the [lidar] and [features] tables of the robot's profile."
-    turn = 2 * math.pi
-    if not (abs(angle_min) <= 2 * turn and 0.0 < abs(increment) <= turn):  # nan is neither
-        what = f"the scan's angles make no sense: angle_min {angle_min}, angle_increment {increment}"
-        raise ReadingError("scan angles", what, remedy)
-    step = abs(increment)
-    if count < 2 or count * step > turn + 1.5 * step:
-        what = f"a scan of {count} beams every {math.degrees(step):.3g} deg has the wrong length"
-        raise ReadingError("scan length", what, remedy)
-    width = fov_rad / bins
-    if not _covers(count, angle_min, increment, fov_rad, max(width, step) / 2):
-        what = (
-            f"the scan has the wrong length: {count} beams from {math.degrees(angle_min):.1f} deg every "
-            f"{math.degrees(increment):.3g} deg do not cover the {math.degrees(fov_rad):.0f} deg ahead"
-        )
-        raise ReadingError("scan length", what, remedy)
-    angles = np.remainder(angle_min + increment * np.arange(count) + math.pi, turn) - math.pi
-    position = (angles + fov_rad / 2) / width
-    inside = np.flatnonzero((position >= -EDGE_BINS) & (position <= bins + EDGE_BINS))
-    index = np.clip(np.floor(position[inside] + EDGE_BINS), 0, bins - 1).astype(np.intp)
-    order = np.argsort(index, kind="stable")
-    groups, starts = np.unique(index[order], return_index=True)
-    return _Layout(inside[order], starts, groups)
-
-
-def _covers(count: int, angle_min: float, increment: float, fov_rad: float, slack_rad: float) -> bool:
-    """Whether beams reach both ends of the field of view ahead, whatever turn their angles are counted in."""
-    if (count + 0.5) * abs(increment) >= 2 * math.pi:
-        return True
-    low, high = sorted((angle_min, angle_min + increment * (count - 1)))
-    middle = (low + high) / 2
-    turn = 2 * math.pi * round(middle / (2 * math.pi))
-    return low - turn <= -fov_rad / 2 + slack_rad + 1e-4 and high - turn >= fov_rad / 2 - slack_rad - 1e-4
-
-
-def _fill(values: FloatArray) -> FloatArray:
-    """Give every nan the value of the nearest bin that has one; of two equally near, the smaller range."""
-    known = np.flatnonzero(~np.isnan(values))
-    if 2 * known.size < values.size:
-        what = f"{values.size - known.size} of {values.size} bins of the scan have no valid beam"
-        raise ReadingError("scan invalid", what, "Clean the lidar, and check that it turns and what is in its way.")
-    if known.size == values.size:
-        return values
-    bins = np.arange(values.size)
-    after = np.searchsorted(known, bins).clip(max=known.size - 1)
-    before = (np.searchsorted(known, bins, side="right") - 1).clip(min=0)
-    to_left, to_right = np.abs(bins - known[before]), np.abs(known[after] - bins)
-    left, right = values[known[before]], values[known[after]]
-    filled: FloatArray = np.where(to_left < to_right, left, right)
-    return np.where(to_left == to_right, np.minimum(left, right), filled)
-
-
-def gray_image(image: Image | CompressedImage, px: int) -> FloatArray:
-    """Turn a camera image into float32 [px, px] in [0, 1]: gray after BT.601, averaged down over areas.
-
-    Raises `SensorError` for data that is truncated, broken or not what its format says.
-    """
-    gray = _decode(image, px) if isinstance(image, CompressedImage) else _raw_gray(image)
-    if gray.shape != (px, px):
-        gray = cv2.resize(gray, (px, px), interpolation=cv2.INTER_AREA).astype(np.uint8, copy=False)
-    return from_uint8(gray)
-
-
-def _check_light(image: FloatArray) -> None:
-    if float(image.max()) <= DARK:
-        raise ReadingError("image black", "the camera's image is black", "Uncover the lens, and switch on the light.")
-
-
-def to_uint8(image: FloatArray) -> ByteArray:
-    """Turn an image in [0, 1] back into the gray levels it came from, exactly."""
-    return np.rint(image * 255).astype(np.uint8)
-
-
-def from_uint8(gray: ByteArray) -> FloatArray:
-    """Scale gray levels to [0, 1]."""
-    image: FloatArray = _UNIT[gray]
-    return image
-
-
-def _raw_gray(image: Image) -> ByteArray:
-    data = image.data
-    channels = {"rgb8": 3, "mono8": 1}.get(image.encoding)
-    shaped = data.ndim == 2 if channels == 1 else data.ndim == 3 and data.shape[2] == channels
-    if not shaped or data.dtype != np.uint8 or data.size == 0:
-        what = f"a {data.dtype} image of shape {data.shape} is not '{image.encoding}'"
-        raise ReadingError("image shape", what, "Publish rgb8 or mono8 images.")
-    return data if channels == 1 else cv2.cvtColor(data, cv2.COLOR_RGB2GRAY).astype(np.uint8, copy=False)
-
-
-def _decode(image: CompressedImage, px: int) -> ByteArray:
-    """Decode to gray, a JPEG straight to the smallest size that has twice `px` pixels a side.
-
-    With fewer, the decoder's blocks are too coarse for the areas averaged afterwards.
-    """
-    data = image.data
-    if data[:2] == b"\xff\xd8":
-        size, whole, reduce = _jpeg_size(data), data.rstrip(b"\0").endswith(_JPEG_END), True
-    elif data[:8] == _PNG_START:
-        size, whole, reduce = _png_size(data), data.endswith(_PNG_END), False
-    else:
-        what = f"{len(data)} bytes that are neither a JPEG nor a PNG"
-        raise ReadingError("image format", what, "Publish jpeg or png images.")
-    if not whole:
-        what = f"a truncated {image.format} image of {len(data)} bytes"
-        raise ReadingError("image truncated", what, "Check the link to the camera; a later image may be whole.")
-    if size is None or not 0 < min(size) <= max(size) <= MAX_IMAGE_PX:
-        raise _broken(image)
-    scale = next(k for k in _REDUCED_GRAY if k == 1 or (reduce and min(size) // k >= 2 * px))
-    try:
-        gray = cv2.imdecode(np.frombuffer(data, np.uint8), _REDUCED_GRAY[scale])
-    except cv2.error as error:
-        raise _broken(image) from error
-    if gray is None:
-        raise _broken(image)
-    return gray.astype(np.uint8, copy=False)
-
-
-def _broken(image: CompressedImage) -> ReadingError:
-    what = f"a {image.format} image of {len(image.data)} bytes that does not decode"
-    return ReadingError("image broken", what, "Check the camera and the link to it; a later image may be whole.")
-
-
-def _jpeg_size(data: bytes) -> tuple[int, int] | None:
-    """Height and width from the frame header (ITU T.81, B.2.2), None where there is none."""
-    at = 2
-    while at + 9 <= len(data) and data[at] == 0xFF:
-        marker = data[at + 1]
-        if marker == 0xFF:  # fill byte
-            at += 1
-        elif 0xC0 <= marker <= 0xCF and marker not in (0xC4, 0xC8, 0xCC):
-            return int.from_bytes(data[at + 5 : at + 7]), int.from_bytes(data[at + 7 : at + 9])
-        else:
-            at += 2 + int.from_bytes(data[at + 2 : at + 4])
-    return None
-
-
-def _png_size(data: bytes) -> tuple[int, int] | None:
-    """Height and width from IHDR, which has to come first."""
-    if data[12:16] != b"IHDR" or len(data) < 24:
-        return None
-    return int.from_bytes(data[20:24]), int.from_bytes(data[16:20])
+    def silent(self, observation: Observation) -> list[str]:
+        """The sensors from which there is nothing."""
+        return [row.sensor for row in self._modalities if getattr(observation, row.name) is None]

@@ -132,9 +132,10 @@ class Battery(Table, frozen=True):
 
 
 class Features(Table, frozen=True):
-    """What the networks see: `bins` ranges over `fov_rad` ahead, clipped at `max_range_m`; a square gray image.
+    """What the networks see: `bins` ranges over `fov_rad` ahead, clipped at `max_range_m`; square pictures.
 
-    `filters` is the width f of the camera trunk (16 simulated, 32 real).
+    `inputs` chooses which features there are, by the names of an observation's fields: `depth` is one more picture,
+    clipped likewise. `filters` is the width f of the trunks that see pictures (16 simulated, 32 real).
     """
 
     fov_rad: Angle
@@ -142,6 +143,7 @@ class Features(Table, frozen=True):
     max_range_m: Positive
     image_px: Annotated[int, Meta(ge=1, le=MAX_IMAGE_PX)]
     filters: Annotated[int, Meta(ge=1, le=MAX_FILTERS)]
+    inputs: Annotated[tuple[str, ...], Meta(min_length=1)] = ("image", "scan")
 
 
 class Control(Table, frozen=True):
@@ -205,6 +207,8 @@ class RobotProfile(Table, frozen=True):
             self._check_below("control", shorter, longer)
         if self.field is not None:
             self._check_below("field", "stop_m", "slow_m")
+        if len(set(self.features.inputs)) < len(self.features.inputs):
+            raise ValueError(f"features.inputs = {list(self.features.inputs)} names one twice")
         if self.features.fov_rad > self.lidar.fov_rad + 1e-6:
             raise ValueError(
                 f"features.fov_rad = {self.features.fov_rad} is wider than lidar.fov_rad = {self.lidar.fov_rad}"

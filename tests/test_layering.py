@@ -32,7 +32,8 @@ ROOMS = {
         "testing": {"messages", "profile", "bus"},
     },
     "fusion": {
-        "preprocess": set(),
+        "modalities": set(),
+        "preprocess": {"modalities"},
         "policies": {"preprocess"},
         "learning": {"preprocess", "policies"},
         "methods": {"preprocess", "policies", "learning"},

@@ -1,20 +1,25 @@
 """Where the experts' checkpoints lie. Without torch: what is missing is said before anything heavy is loaded.
 
-A *pair* says whose experts are meant: those of a task, by its name; others of that task, as TASK@SEED, trained when an
-experiment needs them; or a user's own, by the folder that holds `camera.safetensors` and `lidar.safetensors`.
+A robot has an expert for each sensor that it learns from, called by the sensor. A *pair* (of two, as a rule) says whose
+are meant: those of a task, by its name; others of that task, as TASK@SEED, trained when an experiment needs them; or a
+user's own, by the folder that holds `camera.safetensors`, `lidar.safetensors` and whatever else the robot learns from.
 """
 
 from importlib import resources
 from pathlib import Path
-from typing import Literal
 
 from lira.fusion.experts.tasks import DEFAULT, TASKS
+from lira.fusion.preprocess import MODALITIES, modalities_of
 from lira.hal.errors import ConfigError
 from lira.hal.profile import RobotProfile
 
-Sensor = Literal["camera", "lidar"]
-SHIPPED: tuple[Sensor, ...] = ("camera", "lidar")
+EXPERTS = tuple(row.sensor for row in MODALITIES.values())
 TRAINED = Path("runs") / "experts"
+
+
+def experts_of(profile: RobotProfile) -> tuple[str, ...]:
+    """Names of the experts that a robot has. Raises `ConfigError` for a profile with inputs that it does not have."""
+    return tuple(row.sensor for row in modalities_of(profile))
 
 
 def seeded(pair: str) -> tuple[str, int] | None:
@@ -35,8 +40,9 @@ def folder_of(pair: str) -> Path:
 
 def shipped_path(name: str, profile: RobotProfile, task: str = DEFAULT) -> Path:
     """Where the expert that comes with the project lies."""
-    owner = TASKS[task].lidar if name == "lidar" else task
-    words = [profile.name, *([] if owner == DEFAULT else [owner]), name]
+    owner = TASKS[task].owner(name)
+    robot = TASKS[owner].profile if profile.name == TASKS[task].profile else profile.name
+    words = [robot, *([] if owner == DEFAULT else [owner]), name]
     return Path(str(resources.files("lira.fusion") / "pretrained" / f"{'-'.join(words)}.safetensors"))
 
 
@@ -45,8 +51,8 @@ def expert_path(name_or_path: str, profile: RobotProfile, pair: str = DEFAULT) -
     if name_or_path.endswith(".safetensors"):
         return Path(name_or_path)
     name = name_or_path.removesuffix("-expert")
-    if name not in SHIPPED:
-        names = ", ".join(f"{name}-expert" for name in SHIPPED)
+    if name not in EXPERTS:
+        names = ", ".join(f"{name}-expert" for name in EXPERTS)
         raise ConfigError(f"unknown policy '{name_or_path}'", f"Known: {names}; or give a .safetensors file.")
     train = f"lira train-expert {name} --profile {profile.name}"
     if pair not in TASKS:

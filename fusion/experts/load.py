@@ -2,13 +2,14 @@
 
 import math
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from typing import cast
 
 import numpy as np
 
-from lira.fusion.experts.files import SHIPPED, expert_path
+from lira.fusion.experts.files import EXPERTS as NAMES
+from lira.fusion.experts.files import expert_path
 from lira.fusion.experts.tasks import DEFAULT
 from lira.fusion.methods.base import Alone, Expert, Method, Policy
 from lira.fusion.methods.doubt import Doubtful
@@ -16,7 +17,7 @@ from lira.fusion.methods.shield import Shield, Shielded
 from lira.fusion.policies.checkpoint import Checkpoint, load_checkpoint
 from lira.fusion.policies.kernel_net import KernelNet
 from lira.fusion.policies.networks import Network
-from lira.fusion.preprocess import Features
+from lira.fusion.preprocess import Features, Shape, shapes_of
 from lira.hal.errors import ConfigError, PluginError
 from lira.hal.messages import Action
 from lira.hal.plugins import EXPERTS
@@ -27,25 +28,23 @@ def load_network(name_or_path: str, profile: RobotProfile, pair: str = DEFAULT) 
     """Load a policy and check that it fits the robot. Raises `ConfigError` or `StorageError`."""
     path = expert_path(name_or_path, profile, pair)
     network, checkpoint = load_checkpoint(path)
-    shape = profile.features
-    needs = {"camera": shape.filters == checkpoint.filters, "lidar": shape.bins == checkpoint.bins}
-    fits = needs.get(checkpoint.kind, all(needs.values()))
-    if not fits:
+    own = {**shapes_of(profile), "filters": (profile.features.filters,)}
+    seen = {**checkpoint.features, **({"filters": (checkpoint.filters,)} if checkpoint.filters else {})}
+    if any(own.get(name) != shape for name, shape in seen.items()):
         raise ConfigError(
-            f"{path} was trained for '{checkpoint.profile}' ({checkpoint.bins} beams, {checkpoint.filters} filters), "
-            f"not for '{profile.name}' ({shape.bins} beams, {shape.filters} filters)",
+            f"{path} was trained for '{checkpoint.profile}' ({_sizes(seen)}), not for '{profile.name}' ({_sizes(own)})",
             "Use the checkpoint of this profile, or start with the profile it was trained for.",
         )
     return network, checkpoint
 
 
+def _sizes(shapes: Mapping[str, Shape]) -> str:
+    return ", ".join(f"{name} {'x'.join(map(str, shape))}" for name, shape in shapes.items())
+
+
 def as_expert(name: str, network: Network, cruise: Action | None) -> Expert:
     """Wrap a network as a black box."""
-
-    def act(features: Features) -> Action:
-        return network.act(features.scan, features.image)
-
-    return Expert(name, act) if cruise is None else Expert(name, act, cruise)
+    return Expert(name, network.act) if cruise is None else Expert(name, network.act, cruise)
 
 
 def load_policy(given: str | Expert | Policy, profile: RobotProfile, pair: str = DEFAULT) -> Expert:
@@ -84,8 +83,8 @@ def _load(given: str | Expert | Policy, profile: RobotProfile, pair: str) -> tup
         names = (getattr(given, "name", None), getattr(given, "__name__", None), type(given).__name__)
         return own_expert(given, next(str(name) for name in names if name), profile), None
     if not given.endswith(".safetensors"):
-        found = EXPERTS.find(given, {f"{name}-expert": name for name in SHIPPED})
-        if found not in SHIPPED:
+        found = EXPERTS.find(given, {f"{name}-expert": name for name in NAMES})
+        if found not in NAMES:
             return own_expert(found, given, profile), None
     network, checkpoint = load_network(given, profile, pair)
     return as_expert(checkpoint.kind, network, checkpoint.cruise), network

@@ -1,27 +1,35 @@
 """The thesis's tasks: which experts go with which world, on which robot. Without torch."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 
 @dataclass(frozen=True, slots=True)
 class Task:
     """Worlds whose novice learns from one pair of experts, and the robot of that experiment.
 
-    `lidar` names the task whose lidar expert is used: the one of the garden drives in the corridor too (F.1).
+    `borrowed` names for an expert the task whose it is: the lidar expert of the garden drives in the corridor, too.
     """
 
+    name: str
     profile: str
     worlds: tuple[str, ...]
-    lidar: str
+    borrowed: dict[str, str] = field(default_factory=dict)
+
+    def owner(self, expert: str) -> str:
+        """Which task an expert was trained for."""
+        return self.borrowed.get(expert, self.name)
 
 
 DEFAULT = "line"
 TASKS = {
-    DEFAULT: Task("thesis-sim", ("line-obstacles", "race", "eight-obstacles"), lidar=DEFAULT),
-    "eight": Task("thesis-sim", ("eight",), lidar=DEFAULT),
-    "passage": Task("thesis-sim", ("passage", "passage-train"), lidar="passage"),
-    "garden": Task("rosbot2", ("garden", "garden-train"), lidar="garden"),
-    "corridor": Task("rosbot2", ("corridor", "corridor-train"), lidar="garden"),
+    task.name: task
+    for task in (
+        Task(DEFAULT, "thesis-sim", ("line-obstacles", "race", "eight-obstacles")),
+        Task("eight", "thesis-sim", ("eight",), {"lidar": DEFAULT}),
+        Task("passage", "thesis-sim", ("passage", "passage-train")),
+        Task("garden", "rosbot2", ("garden", "garden-train")),
+        Task("corridor", "rosbot2", ("corridor", "corridor-train"), {"lidar": "garden"}),
+    )
 }
 
 

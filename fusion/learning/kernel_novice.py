@@ -9,6 +9,7 @@ from lira.fusion.learning.labels import Label, mirror
 from lira.fusion.learning.novice import LearningSettings, Novice
 from lira.fusion.policies.kernel import ANGULAR, KernelRidge, KernelSettings
 from lira.fusion.policies.kernel_net import NEVER, KernelNet
+from lira.fusion.policies.networks import batch_of_one
 from lira.fusion.preprocess import Features
 from lira.hal.messages import Action
 
@@ -26,7 +27,7 @@ class KernelNovice(Novice):
         self._sources: list[str] = []
         self._group = 0
         self.limit = math.inf  # the largest deviation of its turn in the proving runs since the last label
-        self.ridge = KernelRidge(network.camera.size + network.lidar.size, network.camera.size, settings)
+        self.ridge = KernelRidge(dict(zip(network.shapes, network.sizes, strict=True)), settings)
 
     def act(self, features: Features) -> Action:
         """m(x)."""
@@ -61,7 +62,7 @@ class KernelNovice(Novice):
             self._group += 1
         human = label.source == "human"
         for each in (label, mirror(label)) if self._mirrored else (label,):
-            x = self._x(Features(each.scan, each.image))
+            x = self._x(each.features)
             self.ridge.add(x, each.action, each.weight, human=human, group=self._group, label=self.stored)
         self._sources.append(label.source)
         self.stored += 1
@@ -79,18 +80,17 @@ class KernelNovice(Novice):
             "x": self.ridge.x[used].numpy(),
             "y": self.ridge.y[used].float().numpy(),
             "noise": (settings.noise / self.ridge.w[used]).float().numpy(),
-            "lengths": torch.tensor([settings.camera_length, settings.lidar_length]).numpy(),
+            "lengths": torch.tensor(self.ridge.lengths).numpy(),
             "scale": self.ridge.fit.scale.float().numpy(),
             "gain": torch.tensor([self.ridge.gain]).numpy(),
             "limit": torch.tensor([min(self.limit, NEVER)]).numpy(),
         }
-        camera, bins = self._network.camera, self._network.lidar.bins
-        network = KernelNet(bins, camera.filters, px=camera.px, examples=int(used.sum()))
+        network = KernelNet(self._network.shapes, self._network.filters, examples=int(used.sum()))
         network.load_weights(weights)
         return network
 
     def _x(self, features: Features) -> Tensor:
         """x [size] of one state."""
         with torch.inference_mode():
-            x = self._network.features(torch.from_numpy(features.scan)[None], torch.from_numpy(features.image)[None])
+            x = self._network.features(batch_of_one(features))
         return x[0].clone()

@@ -2,9 +2,8 @@
 
 from dataclasses import dataclass, replace
 
-import numpy as np
-
-from lira.hal.messages import Action, FloatArray
+from lira.fusion.preprocess import Features
+from lira.hal.messages import Action
 
 REST = 1e-6  # an action within this of zero is none
 
@@ -13,8 +12,7 @@ REST = 1e-6  # an action within this of zero is none
 class Label:
     """What to do on what was seen. `source` is "human" or an expert's name, `weight` scales its squared error."""
 
-    scan: FloatArray
-    image: FloatArray
+    features: Features
     action: Action
     source: str
     weight: float = 1.0
@@ -26,11 +24,6 @@ def is_rest(action: Action) -> bool:
 
 
 def mirror(label: Label) -> Label:
-    """Exchange left and right: beams and columns in reverse, the turn negated."""
+    """Exchange left and right in what is seen, and turn the other way."""
     linear, angular = label.action
-    return replace(
-        label,
-        scan=np.ascontiguousarray(label.scan[::-1]),
-        image=np.ascontiguousarray(label.image[:, ::-1]),
-        action=(linear, -angular),
-    )
+    return replace(label, features=label.features.mirrored(), action=(linear, -angular))

@@ -43,7 +43,7 @@ class LearnedPolicy:
 
     def learn(self, features: Features, action: Action, source: str, a_n: Action) -> bool:  # noqa: ARG002
         """Take in a label unless it tells nothing new; `a_n` is its own action there. Returns whether it was kept."""
-        self.remember(Label(features.scan, features.image, action, source, self.weight(source)))
+        self.remember(Label(features, action, source, self.weight(source)))
         return True
 
     def leaves_out(self, human: Action) -> bool:  # noqa: ARG002

@@ -2,20 +2,23 @@
 
 import copy
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 import torch
+from numpy.typing import NDArray
 from torch import Tensor
 
 from lira.fusion.learning.label_store import FileRows, Rows
 from lira.fusion.learning.labels import Label as Label
 from lira.fusion.learning.labels import mirror
 from lira.fusion.policies.ensemble import EnsembleNet
-from lira.fusion.policies.networks import CameraTrunk, LidarTrunk, Network
+from lira.fusion.policies.networks import Inputs, Network, PictureTrunk, ScanTrunk, batch_of_one
 from lira.fusion.policies.networks import Weights as Weights
-from lira.fusion.preprocess import to_uint8
+from lira.fusion.preprocess import MODALITIES
 
 RESIDENT_BYTES = 128 * 2**20  # of inputs in memory; 10,000 labels with frozen trunks, 92,000 without
+TRUNKS = "trunks"  # what is kept instead of the features where trunks are frozen
 BOOTSTRAP = 0xB007  # the ensemble's draws are a stream of their own, and leave the novice's alone
 
 
@@ -23,9 +26,9 @@ class Learner:
     """Trains a copy of a network on the labels it has been given, and with `mirrored` on their mirror images too.
 
     Deterministic for one seed, one number of threads and one kind of processor. Labels are kept once, in growing
-    arrays: with `frozen_trunks` as the trunk's output (3,200 floats, 12.8 kB), which is then never computed again,
-    otherwise as the scan and an 8-bit image, which is what the camera gave (1.4 kB). From `resident_bytes` on, the
-    scans and images of further labels go to a temporary file, and the trunks see them when they are drawn.
+    arrays: with `frozen_trunks` as the trunks' output (3,200 floats, 12.8 kB), which is then never computed again,
+    otherwise as the features it looks at, pictures in 8 bits (1.4 kB for a scan and an image). From `resident_bytes`
+    on, the features of further labels go to a temporary file, and the trunks see them when they are drawn.
 
     An `EnsembleNet` gets its members trained as well: a label counts for each as often as a draw from Poisson(1) says,
     the bootstrap of a stream.
@@ -45,9 +48,9 @@ class Learner:
     ) -> None:
         self._network = copy.deepcopy(network).requires_grad_(True)
         for trunk in self._network.modules():
-            if frozen_trunks and isinstance(trunk, CameraTrunk | LidarTrunk):
+            if frozen_trunks and isinstance(trunk, PictureTrunk | ScanTrunk):
                 trunk.requires_grad_(False)
-            elif isinstance(trunk, CameraTrunk):
+            elif isinstance(trunk, PictureTrunk):
                 trunk.reduced_precision = _has_bfloat16()
         self._frozen_trunks = frozen_trunks
         self._mirrored = mirrored
@@ -55,7 +58,7 @@ class Learner:
         self._random = np.random.default_rng(seed)
         self._bootstrap = np.random.default_rng([seed, BOOTSTRAP])
         self._resident_bytes = resident_bytes
-        self._inputs: list[Rows] = []
+        self._inputs: dict[str, Rows] = {}
         self._spilled: FileRows | None = None
         self._members = self._network.members if isinstance(self._network, EnsembleNet) else 0
         self._targets = Rows((3 + self._members,), torch.float32)  # linear, angular, weight, times for each member
@@ -88,26 +91,25 @@ class Learner:
         return torch.optim.Adam(trained, lr=self._learning_rate, fused=True)
 
     def _keep(self, label: Label) -> None:
-        gray = to_uint8(label.image)
+        kept = {name: MODALITIES[name].keep(label.features[name]) for name in self._network.shapes}
         if self._spilled is not None:
-            self._spilled.append(label.scan, gray)
+            self._spilled.append(kept)
         else:
-            self._keep_in_memory(label, torch.from_numpy(gray))
+            self._keep_in_memory(label, kept)
         times = self._bootstrap.poisson(1.0, self._members) if self._members else ()
         self._targets.append(torch.tensor([*label.action, label.weight, *times]))
 
-    def _keep_in_memory(self, label: Label, gray: Tensor) -> None:
-        scan = torch.from_numpy(label.scan)
+    def _keep_in_memory(self, label: Label, kept: dict[str, NDArray[Any]]) -> None:
         if self._frozen_trunks:
-            rows = [self._frozen_features(scan[None], torch.from_numpy(label.image)[None])[0]]
+            rows = {TRUNKS: self._frozen_features(batch_of_one(label.features))[0]}
         else:
-            rows = [scan, gray]
+            rows = {name: torch.from_numpy(array) for name, array in kept.items()}
         if not self._inputs:
-            self._inputs = [Rows(tuple(row.shape), row.dtype) for row in rows]
-        for store, row in zip(self._inputs, rows, strict=True):
-            store.append(row)
-        if (self._inputs[0].count + 1) * sum(store.row_bytes for store in self._inputs) > self._resident_bytes:
-            self._spilled = FileRows(label.scan.shape, label.image.shape)
+            self._inputs = {name: Rows(tuple(row.shape), row.dtype) for name, row in rows.items()}
+        for name, store in self._inputs.items():
+            store.append(rows[name])
+        if (self._resident + 1) * sum(store.row_bytes for store in self._inputs.values()) > self._resident_bytes:
+            self._spilled = FileRows(kept)
 
     def _update(self, pick: Tensor) -> float:
         features = self._features(pick)
@@ -128,27 +130,34 @@ class Learner:
 
     def _features(self, pick: Tensor) -> Tensor:
         """Trunk output of some labels [n, size], from wherever they are kept."""
-        resident = self._inputs[0].count
-        near = pick < resident
-        kept = [store.rows[pick[near]] for store in self._inputs]
+        near = pick < self._resident
+        kept = {name: store.rows[pick[near]] for name, store in self._inputs.items()}
         if self._spilled is None or bool(near.all()):
-            return kept[0] if self._frozen_trunks else self._network.features(kept[0], _scaled(kept[1]))
-        scan, gray = self._spilled.read((pick[~near] - resident).tolist())
+            return kept[TRUNKS] if self._frozen_trunks else self._network.features(_scaled(kept))
+        far = self._spilled.read((pick[~near] - self._resident).tolist())
         if not self._frozen_trunks:
-            scans, images = torch.cat([kept[0], scan]), torch.cat([kept[1], gray])
-            features = self._network.features(scans, _scaled(images))
+            both = {name: torch.cat([array, far[name]]) for name, array in kept.items()}
+            features = self._network.features(_scaled(both))
         else:
-            features = torch.cat([kept[0], self._frozen_features(scan, _scaled(gray))])
+            features = torch.cat([kept[TRUNKS], self._frozen_features(_scaled(far))])
         order = torch.cat([near.nonzero(), (~near).nonzero()])[:, 0]
         return features[order.argsort()]
 
-    def _frozen_features(self, scan: Tensor, image: Tensor) -> Tensor:
+    @property
+    def _resident(self) -> int:
+        """How many labels are in memory."""
+        return next(iter(self._inputs.values())).count
+
+    def _frozen_features(self, inputs: Inputs) -> Tensor:
         with torch.no_grad():
-            return self._network.features(scan, image)
+            return self._network.features(inputs)
 
 
-def _scaled(gray: Tensor) -> Tensor:
-    return gray.to(torch.float32) / 255
+def _scaled(kept: Inputs) -> dict[str, Tensor]:
+    """Turn what is kept in 8 bits back into [0, 1]."""
+    return {
+        name: array.to(torch.float32) / 255 if array.dtype == torch.uint8 else array for name, array in kept.items()
+    }
 
 
 def _has_bfloat16() -> bool:

@@ -97,7 +97,7 @@ class Novice(LearnedPolicy, ABC):
         keep_always = source == "human" and not self.settings.filter_human
         if not keep_always and is_redundant(action, a_n, threshold):
             return False
-        self.remember(Label(features.scan, features.image, action, source, self.weight(source)))
+        self.remember(Label(features, action, source, self.weight(source)))
         return True
 
     def leaves_out(self, human: Action) -> bool:
@@ -123,7 +123,7 @@ class NetworkNovice(Novice):
 
     def act(self, features: Features) -> Action:
         """a^N of the current network."""
-        return self.network.act(features.scan, features.image)
+        return self.network.act(features)
 
     def remember(self, label: Label) -> None:
         """Hand a label to the trainer."""

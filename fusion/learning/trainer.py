@@ -18,12 +18,14 @@ import numpy as np
 import torch
 
 from lira.fusion.learning.learner import Label, Learner
-from lira.fusion.policies.networks import IMAGE_PX, FusionNet, Weights
+from lira.fusion.policies.networks import FusionNet, Weights
+from lira.fusion.preprocess import Features
 from lira.hal.errors import LiraError
 from lira.hal.messages import FloatArray
 
 NICENESS = 5
 EXIT_TIMEOUT_S = 2.0  # between a process's last sign of life and its exit code
+SMALL = {"image": (32, 32), "scan": (8,)}  # a network to warm up with
 _EARLY_S = 1e-9  # simulated time is a sum of periods and may come out this much short
 
 
@@ -188,6 +190,7 @@ def _serve(pickled: bytes, pipe: Connection, shared: _SharedWeights) -> None:
 
 def _warm_up() -> None:
     """Train a small network for nothing: PyTorch loads much of itself at the first step, which takes seconds."""
-    learner = Learner(FusionNet(bins=8, filters=4), seed=0, frozen_trunks=False)
-    learner.add(Label(np.zeros(8, np.float32), np.zeros((IMAGE_PX, IMAGE_PX), np.float32), (0.0, 0.0), "none"))
+    learner = Learner(FusionNet(SMALL, filters=4), seed=0, frozen_trunks=False)
+    nothing = Features(**{name: np.zeros(shape, np.float32) for name, shape in SMALL.items()})
+    learner.add(Label(nothing, (0.0, 0.0), "none"))
     learner.train_step()

@@ -1,32 +1,40 @@
 """The demonstration log as bytes: what a record looks like.
 
-Layout, little-endian: a header (magic, version, bins, px, profile, CRC-32), then records of one size, each with a
-CRC-32 of its own. A record that is sealed but makes no sense is none.
+Layout, little-endian: a header (magic, version, features as JSON, profile, CRC-32), then records of one size, each with
+a CRC-32 of its own: fields, then the arrays, scans as float32 before pictures of 8 bits. A record that is sealed but
+makes no sense is none.
 
-The byte of flags and the number of the run were zero bits in the first logs, which read as run 0, not mirrored.
+Version 1 had a scan and an image, and their two sizes in the header; its records are the same, so such a log is read,
+and goes on as it is. The byte of flags and the number of the run were zero bits in the first logs, which read as run 0,
+not mirrored.
 """
 
 import math
 import struct
 import zlib
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import BinaryIO
+from typing import BinaryIO, Self
 
+import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
 from lira.fusion.learning.labels import is_rest
-from lira.fusion.preprocess import from_uint8, to_uint8
+from lira.fusion.preprocess import MODALITIES, Features, Shape, shapes_of
+from lira.hal.config import MALFORMED
 from lira.hal.errors import StorageError
-from lira.hal.messages import Action, FloatArray
-from lira.hal.profile import MAX_BINS, MAX_IMAGE_PX, RobotProfile
+from lira.hal.messages import Action
+from lira.hal.profile import RobotProfile
 
 MAGIC = b"LIRADEMO"
-VERSION = 1
-LIMIT = 1.01  # actions are in [-1, 1] and ranges in [0, 1], give or take the rounding of who divided
+VERSION = 2
+LIMIT = 1.01  # actions are in [-1, 1] and features in [0, 1], give or take the rounding of who divided
 
-_HEADER = struct.Struct("<8sHHHH")  # magic, version, bins, px, bytes of the profile's name
+_BEGIN = struct.Struct("<8sH")  # magic, version
+_SIZES = struct.Struct("<HH")  # bytes of the features' JSON, of the profile's name
+_FIRST_SIZES = struct.Struct("<HHH")  # of version 1: bins, px, bytes of the profile's name
 _FIELDS = struct.Struct("<dqHHB32sdddd")  # stamp, observation, lap, run, flags, source, action, novice's action
 _FLAGS_AT, _SOURCE_AT = 20, 21
 _ACTIONS_AT = (53, 61, 69, 77)
@@ -40,9 +48,9 @@ _CRC = struct.Struct("<I")
 class Demonstration:
     """One label that was given, and whether the redundancy filter stored it.
 
-    `source` is "human", an expert's name or "mean"; `novice` is a^N at that time; `scan` float32 [bins] and `image`
-    float32 [px, px] are the features. `mirrored`: it was learned with left and right exchanged, too. `run` is which
-    opening of the log it was given in, from 0; the log sets both.
+    `source` is "human", an expert's name or "mean"; `novice` is a^N at that time; `features` what was seen.
+    `mirrored`: it was learned with left and right exchanged, too. `run` is which opening of the log it was given in,
+    from 0; the log sets both.
     """
 
     stamp_s: float
@@ -52,8 +60,7 @@ class Demonstration:
     action: Action
     novice: Action
     stored: bool
-    scan: FloatArray
-    image: FloatArray
+    features: Features
     mirrored: bool = False
     run: int = 0
 
@@ -65,40 +72,62 @@ class Demonstration:
 
 @dataclass(frozen=True, slots=True)
 class Format:
-    """What a log holds, from its header."""
+    """What a log holds, from its header: the features' names and shapes in the order in which they lie in a record."""
 
-    bins: int
-    px: int
+    features: tuple[tuple[str, Shape], ...]
     profile: str
+    version: int = field(default=VERSION, compare=False)
 
     @classmethod
-    def of(cls, profile: RobotProfile) -> "Format":
+    def of(cls, profile: RobotProfile) -> Self:
         """Return the format of a robot's logs."""
-        return cls(profile.features.bins, profile.features.image_px, profile.name)
+        return cls.holding(shapes_of(profile), profile.name)
+
+    @classmethod
+    def holding(cls, shapes: Mapping[str, Shape], profile: str) -> Self:
+        """Return the format of logs with these features. Raises `ValueError` for some that no robot of ours has."""
+        if not shapes or not shapes.keys() <= MODALITIES.keys():
+            raise ValueError(f"features {', '.join(shapes)}")
+        for name, shape in shapes.items():
+            MODALITIES[name].check(shape)
+        wide_first = sorted(shapes.items(), key=lambda each: -_itemsize(each[0]))
+        return cls(tuple(wide_first), profile)
 
     @property
     def record_bytes(self) -> int:
         """Size of every record."""
-        return _CRC.size + _FIELDS.size + 4 * self.bins + self.px**2
+        return _CRC.size + _FIELDS.size + sum(_itemsize(name) * math.prod(shape) for name, shape in self.features)
 
     def header(self) -> bytes:
         """Return the file's first bytes."""
         name = self.profile.encode()
-        return _sealed(_HEADER.pack(MAGIC, VERSION, self.bins, self.px, len(name)) + name)
+        begin = _BEGIN.pack(MAGIC, self.version)
+        if self.version == 1:
+            shapes = dict(self.features)
+            return _sealed(begin + _FIRST_SIZES.pack(shapes["scan"][0], shapes["image"][0], len(name)) + name)
+        features = msgspec.json.encode(dict(self.features))
+        return _sealed(begin + _SIZES.pack(len(features), len(name)) + features + name)
+
+    def words(self) -> str:
+        """The robot and its features, for people."""
+        sizes = ", ".join(f"{name} {'x'.join(map(str, shape))}" for name, shape in self.features)
+        return f"'{self.profile}' ({sizes})"
 
     def encode(self, record: Demonstration) -> bytes:
         """Raises `ValueError` for what `decode` would not take: features of another size, actions out of range."""
         source = record.source.encode()
-        if record.scan.shape != (self.bins,) or record.image.shape != (self.px, self.px) or len(source) > _SOURCE_BYTES:
+        shapes = {name: array.shape for name, array in record.features.items()}
+        if shapes != dict(self.features) or len(source) > _SOURCE_BYTES:
             raise ValueError(
-                f"a label of '{record.source}' with a scan {record.scan.shape} and an image {record.image.shape} "
-                f"does not fit a log of {self.bins} bins and {self.px} px"
+                f"a label of '{record.source}' with {record.features} does not fit a log of {self.words()}"
             )
         flags = _STORED * record.stored + _MIRRORED * record.mirrored
         counts = min(record.lap, _MOST), min(record.run, _MOST)
         fields = (record.stamp_s, record.observation, *counts, flags, source, *record.action, *record.novice)
-        scan = np.ascontiguousarray(record.scan, dtype="<f4").tobytes()
-        data = _sealed(_FIELDS.pack(*fields) + scan + to_uint8(record.image).tobytes())
+        kept = [
+            MODALITIES[name].keep(record.features[name]).astype(_dtype(name)).tobytes() for name, _ in self.features
+        ]
+        data = _sealed(_FIELDS.pack(*fields) + b"".join(kept))
         if self.decode(data) is None:
             raise ValueError(f"a label of '{record.source}' with the actions {record.action} and {record.novice}")
         return data
@@ -108,14 +137,14 @@ class Format:
         if len(data) != self.record_bytes or not _is_sealed(data):
             return None
         stamp_s, observation, lap, run, flags, source, *actions = _FIELDS.unpack_from(data)
-        scan = np.frombuffer(data, "<f4", self.bins, _FIELDS.size).astype(np.float32)
+        features = self._features(data)
         name = _text(source.rstrip(b"\0"))
-        bounded = max(map(abs, actions)) <= LIMIT and np.abs(scan).max() <= LIMIT
         # A nan among others need not be the largest of them; in the sum it shows.
-        finite = math.isfinite(stamp_s + sum(actions)) and math.isfinite(scan.sum())
-        if not (name and bounded and finite and flags <= _STORED | _MIRRORED):
+        finite = math.isfinite(stamp_s + sum(actions))
+        if not (name and finite and max(map(abs, actions)) <= LIMIT and flags <= _STORED | _MIRRORED):
             return None
-        gray = np.frombuffer(data, np.uint8, self.px**2, _FIELDS.size + 4 * self.bins).reshape(self.px, self.px)
+        if features is None:
+            return None
         return Demonstration(
             stamp_s=stamp_s,
             observation=observation,
@@ -124,11 +153,21 @@ class Format:
             action=(actions[0], actions[1]),
             novice=(actions[2], actions[3]),
             stored=bool(flags & _STORED),
-            scan=scan,
-            image=from_uint8(gray),
+            features=features,
             mirrored=bool(flags & _MIRRORED),
             run=run,
         )
+
+    def _features(self, data: bytes) -> Features | None:
+        """What was seen, of a record's bytes; None if that cannot have been."""
+        arrays, at = {}, _FIELDS.size
+        for name, shape in self.features:
+            kept = np.frombuffer(data, _dtype(name), math.prod(shape), at).reshape(shape)
+            arrays[name] = MODALITIES[name].restore(kept)
+            at += kept.nbytes
+            if not (np.abs(arrays[name]).max() <= LIMIT and math.isfinite(arrays[name].sum())):
+                return None
+        return Features(**arrays)
 
     def places(self, block: bytes) -> NDArray[np.intp]:
         """Return where in a block a record may begin: few places, so that few checksums are reckoned."""
@@ -142,17 +181,43 @@ class Format:
 
 def read_format(file: BinaryIO, path: Path) -> Format:
     """Read the header. Raises `StorageError` for a file that is no log, or whose header cannot be read."""
-    start = file.read(_HEADER.size)
-    if len(start) < _HEADER.size or not start.startswith(MAGIC):
+    start = file.read(_BEGIN.size)
+    if len(start) < _BEGIN.size or not start.startswith(MAGIC):
         raise StorageError(f"{path} is no demonstration log", "Give the path of a log, or of a new file.")
-    _, version, bins, px, name_bytes = _HEADER.unpack(start)
-    if version != VERSION:
-        raise StorageError(f"{path} is a log of version {version}", f"This program reads version {VERSION}.")
-    rest = file.read(name_bytes + _CRC.size)
-    name = _text(rest[:name_bytes])
-    if not (name and _is_sealed(start + rest) and bins <= MAX_BINS and px <= MAX_IMAGE_PX):
-        raise StorageError(f"the header of {path} is damaged", f"See what can be saved: lira labels check {path}")
-    return Format(bins, px, name)
+    _, version = _BEGIN.unpack(start)
+    if version not in (1, VERSION):
+        raise StorageError(f"{path} is a log of version {version}", f"This program reads versions 1 to {VERSION}.")
+    try:
+        return _read_sizes(file, start, version)
+    except (*MALFORMED, struct.error) as error:
+        raise StorageError(
+            f"the header of {path} is damaged", f"See what can be saved: lira labels check {path}"
+        ) from (error)
+
+
+def _read_sizes(file: BinaryIO, start: bytes, version: int) -> Format:
+    """Read what follows the version. Raises `ValueError` and its like for what makes no sense."""
+    sizes = _FIRST_SIZES if version == 1 else _SIZES
+    start += file.read(sizes.size)
+    *_, name_bytes = counts = sizes.unpack_from(start, _BEGIN.size)
+    features_bytes = 0 if version == 1 else counts[0]
+    text = file.read(features_bytes + name_bytes)
+    name = _text(text[features_bytes:])
+    if not (name and _is_sealed(start + text + file.read(_CRC.size))):
+        raise ValueError("it is not sealed")
+    if version == 1:
+        shapes: dict[str, Shape] = {"scan": (counts[0],), "image": (counts[1], counts[1])}
+    else:
+        shapes = msgspec.json.decode(text[:features_bytes], type=dict[str, Shape])
+    return replace(Format.holding(shapes, name), version=version)
+
+
+def _dtype(name: str) -> str:
+    return "<f4" if MODALITIES[name].dtype is np.float32 else "u1"
+
+
+def _itemsize(name: str) -> int:
+    return np.dtype(_dtype(name)).itemsize
 
 
 def _text(data: bytes) -> str:

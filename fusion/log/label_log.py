@@ -174,10 +174,10 @@ class DemonstrationLog:
                 form = read_format(file, self.path)
                 if form != self._format:
                     raise StorageError(
-                        f"{self.path} holds demonstrations for '{form.profile}' ({form.bins} bins, {form.px} px), "
-                        f"not for '{self._format.profile}' ({self._format.bins} bins, {self._format.px} px)",
+                        f"{self.path} holds demonstrations for {form.words()}, not for {self._format.words()}",
                         "Give a new file for this robot.",
                     )
+                self._format = form  # an older one goes on as it is
                 found = survey(file, form, file.tell())
             if found.lost_bytes > 0:
                 clean, kept = heal(file, found, self.path)

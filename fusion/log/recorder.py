@@ -4,13 +4,12 @@ import time
 from collections.abc import Callable
 from dataclasses import replace
 
-import numpy as np
-
 from lira.fusion.control import Step
 from lira.fusion.log.counts import Ledger
 from lira.fusion.log.label_log import Demonstration
 from lira.fusion.log.run_log import Pose, Record, StepRecord
 from lira.fusion.methods.base import Call, Proposal
+from lira.fusion.preprocess import MODALITIES
 from lira.hal.messages import Decision
 
 
@@ -62,7 +61,7 @@ class Journal:
                 state=None if step.state is None else Pose.of(step.state),
                 layout=layout,
                 label=choice.driver if step.lesson.stored else None,
-                image=(features.image * 255).round().astype(np.uint8).tobytes() if risen else None,
+                image=MODALITIES["image"].keep(features.image).tobytes() if risen and "image" in features else None,
                 elapsed_s=self.elapsed_s,
             )
         )
@@ -79,8 +78,7 @@ class Journal:
                 action=choice.label,
                 novice=step.proposal.novice,
                 stored=step.lesson.stored,
-                scan=features.scan,
-                image=features.image,
+                features=features,
             )
             if step.lesson.reserved:
                 self._reserved[id(step.proposal)] = step.proposal, label

@@ -7,7 +7,7 @@ import inspect
 import re
 from collections.abc import Callable
 from pathlib import Path
-from typing import Literal, cast
+from typing import cast
 
 import msgspec
 
@@ -65,7 +65,6 @@ Rival = (
     | SwitchingSettings
 )
 Approach = LiraSettings | PlusSettings | Rival | OwnSettings
-Sensor = Literal["camera", "lidar"]
 
 
 class Preset(msgspec.Struct, frozen=True):
@@ -83,7 +82,7 @@ class Preset(msgspec.Struct, frozen=True):
     approach: Approach
     learning: LearningSettings = LearningSettings()
     trunks: Trunks = "frozen"
-    warm: tuple[Sensor, ...] = ()
+    warm: tuple[str, ...] = ()
     mirrored: bool = False
     sharing: SharingSettings | None = None
     kernel: KernelSettings | None = None
@@ -113,7 +112,7 @@ _HOLD = PRESETS["hold"]
 _HG = HgDaggerSettings()
 _HEAVY = LearningSettings(labels_per_step=10, human_weight=3.0)
 _M10 = LearningSettings(labels_per_step=10)
-_BOTH: tuple[Sensor, ...] = ("camera", "lidar")
+_BOTH = ("camera", "lidar")
 
 
 def _plus(name: str, **changes: object) -> Preset:

@@ -3,7 +3,7 @@
 import json
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any, Self
 
 import msgspec
 import torch
@@ -12,14 +12,15 @@ from safetensors import SafetensorError, safe_open
 from safetensors.numpy import save
 
 from lira.fusion.policies.kernel_net import KernelNet
-from lira.fusion.policies.networks import IMAGE_PX, CameraNet, FusionNet, Kind, LidarNet, Network, Weights
+from lira.fusion.policies.networks import ExpertNet, FusionNet, Network, Weights
+from lira.fusion.preprocess import MODALITIES, Shape
 from lira.hal.config import MALFORMED, open_regular, write_whole
 from lira.hal.errors import StorageError
-from lira.hal.profile import MAX_BINS, MAX_FILTERS, MAX_IMAGE_PX
+from lira.hal.messages import Action
+from lira.hal.profile import MAX_FILTERS
 
 MOST_BYTES = 2**28  # eighty times the largest network that any robot here needs
-LEAST_PX = 6  # two convolutions and a pooling leave one pixel of it
-
+NOVICES = (FusionNet.kind, KernelNet.kind)
 MOST_EXAMPLES = 4096
 _KEY = "lira"  # the one metadata entry, JSON
 _Share = Annotated[float, Meta(ge=-1.01, le=1.01)]  # of a robot's top speed
@@ -29,23 +30,29 @@ _Share = Annotated[float, Meta(ge=-1.01, le=1.01)]  # of a robot's top speed
 class Checkpoint:
     """What a file of weights is.
 
-    `cruise` is an expert's measured action (linear, angular) on an empty straight course; `provenance` the command
-    that made it. `bins`, `filters` and `px` are the sizes of the sensors' trunks, also for the one that is not used.
-    `labels` and `training_steps` are what it took; None for a file that was written before they were counted.
-    `examples` is how many a kernel drives by; a network drives by none, and its file does not speak of them.
+    `features` are those that the network looks at, by name and in order, with their shapes; `filters` is the width of
+    the trunks that see pictures, 0 without any. `cruise` is an expert's measured action (linear, angular) on an empty
+    straight course; `provenance` the command that made it. `labels` and `training_steps` are what it took; None for a
+    file that was written before they were counted. `examples` is how many a kernel drives by; a network drives by none,
+    and its file does not speak of them.
     """
 
-    kind: Kind
-    bins: Annotated[int, Meta(ge=1, le=MAX_BINS)]
-    filters: Annotated[int, Meta(ge=1, le=MAX_FILTERS)]
+    kind: str
+    features: dict[str, Shape]
+    filters: Annotated[int, Meta(ge=0, le=MAX_FILTERS)]
     profile: str
     cruise: tuple[_Share, _Share] | None
     provenance: str
     seed: Annotated[int, Meta(ge=0, le=2**63 - 1)]
-    px: Annotated[int, Meta(ge=LEAST_PX, le=MAX_IMAGE_PX)] = IMAGE_PX
     labels: int | None = None
     training_steps: int | None = None
     examples: Annotated[int, Meta(ge=0, le=MOST_EXAMPLES)] = 0
+
+    @classmethod
+    def of(cls, network: Network, profile: str, provenance: str, seed: int, cruise: Action | None = None) -> Self:
+        """Describe a network that was trained for a robot with this profile."""
+        shapes, filters = network.shapes, network.filters
+        return cls(network.kind, shapes, filters, profile, cruise, provenance, seed, examples=network.examples)
 
 
 def save_checkpoint(path: Path, network: Network, checkpoint: Checkpoint) -> None:
@@ -68,7 +75,8 @@ def load_checkpoint(path: Path) -> tuple[Network, Checkpoint]:
             metadata = file.metadata() or {}
             if _KEY not in metadata:
                 raise StorageError(f"{path} is no checkpoint of this project", "Give a file that 'lira' has written.")
-            checkpoint = msgspec.json.decode(metadata[_KEY], type=Checkpoint)
+            about = msgspec.json.decode(metadata[_KEY], type=dict[str, Any])
+            checkpoint = msgspec.convert(_named(about), Checkpoint)
             names = file.keys()
             _check_shapes(checkpoint, {name: tuple(file.get_slice(name).get_shape()) for name in names})
             weights: Weights = {name: file.get_tensor(name) for name in names}
@@ -103,14 +111,29 @@ def _check_shapes(checkpoint: Checkpoint, found: dict[str, tuple[int, ...]]) -> 
             raise ValueError(f"{name} is {found[name]} instead of {shape}")
 
 
+def _named(about: dict[str, Any]) -> dict[str, Any]:
+    """Say by name which features a file is about that was written when there were only two, by their sizes."""
+    if "features" in about or not {"kind", "bins", "filters"} <= about.keys():
+        return about
+    px = about.get("px", 32)
+    both = {"image": [px, px], "scan": [about["bins"]]}
+    seen = {name: shape for name, shape in both.items() if about["kind"] in (MODALITIES[name].sensor, *NOVICES)}
+    return {**about, "features": seen, "filters": about["filters"] if "image" in seen else 0}
+
+
 def build(checkpoint: Checkpoint) -> Network:
-    """Make the network a checkpoint describes, with fresh weights. Raises `ValueError` for too many examples."""
+    """Make the network a checkpoint describes, with fresh weights. Raises `ValueError` for one that nobody trains."""
     if not 0 <= checkpoint.examples <= MOST_EXAMPLES:
         raise ValueError(f"a kernel of {checkpoint.examples} examples")
-    if checkpoint.kind == "camera":
-        return CameraNet(checkpoint.filters, px=checkpoint.px, seed=checkpoint.seed)
-    if checkpoint.kind == "lidar":
-        return LidarNet(checkpoint.bins, seed=checkpoint.seed)
-    if checkpoint.kind == "kernel":
-        return KernelNet(checkpoint.bins, checkpoint.filters, px=checkpoint.px, examples=checkpoint.examples)
-    return FusionNet(checkpoint.bins, checkpoint.filters, px=checkpoint.px, seed=checkpoint.seed)
+    shapes, filters, seed = checkpoint.features, checkpoint.filters, checkpoint.seed
+    if not shapes or len(shapes) > len(MODALITIES):
+        raise ValueError(f"a network of {len(shapes)} features")
+    if checkpoint.kind == KernelNet.kind:
+        return KernelNet(shapes, filters, examples=checkpoint.examples)
+    if checkpoint.kind == FusionNet.kind:
+        return FusionNet(shapes, filters, seed=seed)
+    (name, shape), *others = shapes.items()
+    network = ExpertNet(name, shape, filters, seed=seed)
+    if others or network.kind != checkpoint.kind:
+        raise ValueError(f"a {checkpoint.kind} network that sees {', '.join(shapes)}")
+    return network

@@ -8,7 +8,7 @@ import torch
 from torch import Tensor, nn
 from torch.nn.functional import leaky_relu
 
-from lira.fusion.policies.networks import FUSION_HIDDEN, SLOPE, FusionNet
+from lira.fusion.policies.networks import FUSION_HIDDEN, SLOPE, FusionNet, batch_of_one
 from lira.fusion.preprocess import Features
 from lira.hal.messages import FloatArray
 
@@ -17,11 +17,11 @@ class EnsembleNet(FusionNet):
     """The novice, and `members` more heads: fusion layers of the same sizes, initialised from seeds of their own."""
 
     def __init__(self, like: FusionNet, members: int, seed: int) -> None:
-        super().__init__(like.lidar.bins, like.camera.filters, px=like.camera.px)
+        super().__init__(like.shapes, like.filters)
         self.load_state_dict(like.state_dict())
         self.members = members
         heads = [
-            FusionNet(like.lidar.bins, like.camera.filters, px=like.camera.px, seed=one)
+            FusionNet(like.shapes, like.filters, seed=one)
             for one in np.random.default_rng(seed).integers(2**31, size=members).tolist()
         ]
         layers = [[head.fc1, head.fc2, head.out] for head in heads]
@@ -33,7 +33,7 @@ class EnsembleNet(FusionNet):
 
     def novice(self) -> FusionNet:
         """Return a copy of the novice without its ensemble."""
-        alone = FusionNet(self.lidar.bins, self.camera.filters, px=self.camera.px)
+        alone = FusionNet(self.shapes, self.filters)
         alone.load_state_dict({name: value for name, value in self.state_dict().items() if name in alone.state_dict()})
         return alone
 
@@ -49,5 +49,4 @@ class EnsembleNet(FusionNet):
     def opinions(self, seen: Features) -> FloatArray:
         """What each member would do, float32 [members, 2]."""
         with torch.inference_mode():
-            trunk = self.trunk(torch.from_numpy(seen.scan)[None], torch.from_numpy(seen.image)[None])
-            return self.member_heads(trunk)[:, 0].numpy()
+            return self.member_heads(self.features(batch_of_one(seen)))[:, 0].numpy()

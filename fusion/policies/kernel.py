@@ -1,9 +1,10 @@
-"""The kernel novice: Gaussian-process regression on what both experts have learned to see.
+"""The kernel novice: Gaussian-process regression on what the experts have learned to see.
 
 In the symbols of this page, n being the number of examples (a label and its mirror image are two):
 
-    x = (c, d)   camera part c and lidar part d: the outputs of both experts' trunks, each scaled to length 1
-    k(x, x')     exp(-(1 - <c, c'>) / l_c^2 - (1 - <d, d'>) / l_d^2), a Gaussian kernel on two spheres; k(x, x) = 1
+    x = (c, d)   a part for each sensor (c camera, d lidar): the outputs of the experts' trunks, each scaled to length 1
+    k(x, x')     exp(-(1 - <c, c'>) / l_c^2 - (1 - <d, d'>) / l_d^2), and so on for more sensors: a product of Gaussian
+                 kernels on spheres, each with its length scale; k(x, x) = 1
     K            k of all pairs [n, n];  N = diag(noise / w), w the weight of a label (a human's counts more);  Y [n, 2]
     P            (K + N)^-1
     A            P Y [n, 2]
@@ -31,6 +32,7 @@ Sources: Rasmussen & Williams, Gaussian Processes for Machine Learning (2006), e
 changes P by O(n^2) work, so it is done between two steps.
 """
 
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -47,24 +49,26 @@ GAINS = (1.0, 1.7)  # bounds of g: few interventions tell little of it, and beyo
 class KernelSettings(Table, frozen=True):
     """Length scales, noise and what is left out; `gain` None: calibrated. `most` bounds the examples, and the time."""
 
-    camera_length: float = 0.4  # l_c
-    lidar_length: float = 0.4  # l_d
+    length: float = 0.4  # l of every feature's part
+    lengths: tuple[tuple[str, float], ...] = ()  # of those where it is another: the feature's name, and l
     noise: float = 0.1  # variance of a label of weight 1
     contradicts: float | None = 1.2  # residual of the turn that sets a label aside; None: none is
     gain: float | None = None
     most: int = 800
 
 
-def unit(features: Tensor, camera_size: int) -> Tensor:
-    """x [n, size] of the trunks' outputs [n, size], camera first: each part scaled to length 1."""
-    return torch.cat([normalize(features[:, :camera_size]), normalize(features[:, camera_size:])], dim=1)
+def unit(features: Tensor, sizes: Sequence[int]) -> Tensor:
+    """x [n, size] of the trunks' outputs [n, size], parts of these sizes: each is scaled to length 1."""
+    return torch.cat([normalize(part) for part in torch.split(features, list(sizes), dim=1)], dim=1)
 
 
-def kernel(one: Tensor, other: Tensor, camera_size: int, lengths: tuple[float, float]) -> Tensor:
-    """k of all pairs, float64 [n, m], of states [n, size] and [m, size]; `lengths` are l_c and l_d."""
-    camera = 1.0 - (one[:, :camera_size] @ other[:, :camera_size].T).double()
-    lidar = 1.0 - (one[:, camera_size:] @ other[:, camera_size:].T).double()
-    return torch.exp(-camera / lengths[0] ** 2 - lidar / lengths[1] ** 2)
+def kernel(one: Tensor, other: Tensor, sizes: Sequence[int], lengths: Sequence[float]) -> Tensor:
+    """k of all pairs, float64 [n, m], of states [n, size] and [m, size]; a size and a length scale for each part."""
+    exponent = torch.zeros(len(one), len(other), dtype=torch.float64)
+    parts = zip(torch.split(one, list(sizes), dim=1), torch.split(other, list(sizes), dim=1), lengths, strict=True)
+    for mine, theirs, length in parts:
+        exponent -= (1.0 - (mine @ theirs.T).double()) / length**2
+    return exponent.exp()
 
 
 @dataclass(frozen=True)
@@ -136,11 +140,12 @@ class Fit:
 class KernelRidge:
     """Examples, and the regression on them, kept up to date one example at a time."""
 
-    def __init__(self, size: int, camera_size: int, settings: KernelSettings) -> None:
-        """`size` features in all, of which the first `camera_size` are the camera's."""
-        self._camera_size = camera_size
+    def __init__(self, sizes: Mapping[str, int], settings: KernelSettings) -> None:
+        """`sizes` of the parts of x, in order, by the names of the features that they come from."""
+        self._sizes = tuple(sizes.values())
+        self.lengths = tuple(dict(settings.lengths).get(name, settings.length) for name in sizes)
         self._settings = settings
-        self.x = torch.empty(0, size)  # float32 [n, size]
+        self.x = torch.empty(0, sum(self._sizes))  # float32 [n, size]
         self.y = torch.empty(0, 2, dtype=torch.float64)
         self.w = torch.empty(0, dtype=torch.float64)
         self.human = torch.empty(0, dtype=torch.bool)
@@ -154,8 +159,7 @@ class KernelRidge:
 
     def k(self, x: Tensor) -> Tensor:
         """Kernel values of one state x [size] with all examples, float64 [n]."""
-        lengths = self._settings.camera_length, self._settings.lidar_length
-        return kernel(self.x, x[None], self._camera_size, lengths)[:, 0]
+        return kernel(self.x, x[None], self._sizes, self.lengths)[:, 0]
 
     def add(
         self, x: Tensor, action: tuple[float, float], weight: float, *, human: bool, group: int, label: int

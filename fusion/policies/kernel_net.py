@@ -1,6 +1,6 @@
-"""The novice of `fusion/kernel.py` as a network that drives alone, and as a file."""
+"""The novice of `policies/kernel.py` as a network that drives alone, and as a file."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import torch
@@ -8,17 +8,17 @@ from numpy.typing import NDArray
 from torch import Tensor
 
 from lira.fusion.policies.kernel import ANGULAR, kernel, unit
-from lira.fusion.policies.networks import IMAGE_PX, CameraNet, CameraTrunk, LidarNet, LidarTrunk, Network
-from lira.fusion.preprocess import Features
+from lira.fusion.policies.networks import ExpertNet, Inputs, SeeingNet, batch_of_one, seen_by
+from lira.fusion.preprocess import Features, Shape
 
 NEVER = 1e9  # a limit that no deviation comes to; a file holds finite numbers
 
 
-class KernelNet(Network):
-    """The regression when nobody teaches it any more: both experts' trunks, the examples in use, and their solution.
+class KernelNet(SeeingNet):
+    """The regression when nobody teaches it any more: the experts' trunks, the examples in use, and their solution.
 
-    Its weights are the trunks' and, for n examples, `x` [n, size], `y` [n, 2] and `noise` [n], the length scales
-    [l_c, l_d], the deviations s [2] and the gain g [1], all as in `fusion/kernel.py`; and the `limit` [1], the largest
+    Its weights are the trunks' and, for n examples, `x` [n, size], `y` [n, 2] and `noise` [n], a length scale for each
+    trunk, the deviations s [2] and the gain g [1], all as in `policies/kernel.py`; and the `limit` [1], the largest
     deviation of a turn in the runs that proved it.
     """
 
@@ -31,27 +31,28 @@ class KernelNet(Network):
     gain: Tensor
     limit: Tensor
 
-    def __init__(self, bins: int, filters: int, *, px: int = IMAGE_PX, examples: int = 0) -> None:
-        super().__init__()
-        self.camera, self.lidar = CameraTrunk(filters, px), LidarTrunk(bins)
-        size = self.camera.size + self.lidar.size
-        shapes = {"x": (examples, size), "y": (examples, 2), "noise": (examples,)}
-        for name, shape in {**shapes, "lengths": (2,), "scale": (2,), "gain": (1,), "limit": (1,)}.items():
+    def __init__(self, shapes: Mapping[str, Shape], filters: int, *, examples: int = 0) -> None:
+        super().__init__(shapes, filters)
+        of_examples = {"x": (examples, sum(self.sizes)), "y": (examples, 2), "noise": (examples,)}
+        of_all = {"lengths": (len(self.sizes),), "scale": (2,), "gain": (1,), "limit": (1,)}
+        for name, shape in {**of_examples, **of_all}.items():
             self.register_buffer(name, torch.ones(shape))
         self.requires_grad_(False)
         self._solution: tuple[Tensor, Tensor] | None = None
 
     @classmethod
-    def from_experts(cls, camera: CameraNet, lidar: LidarNet) -> "KernelNet":
+    def from_experts(cls, experts: Sequence[ExpertNet]) -> "KernelNet":
         """Build one that sees as the experts do and knows nothing."""
-        network = cls(lidar.trunk.bins, camera.trunk.filters, px=camera.trunk.px)
-        network.camera.load_state_dict(camera.trunk.state_dict())
-        network.lidar.load_state_dict(lidar.trunk.state_dict())
-        return network
+        return cls(*seen_by(experts)).see_as(experts)
 
-    def features(self, scan: Tensor, image: Tensor, /) -> Tensor:
+    @property
+    def sizes(self) -> tuple[int, ...]:
+        """Sizes of the trunks' outputs."""
+        return tuple(trunk.size for trunk in self.trunks.values())
+
+    def features(self, inputs: Inputs) -> Tensor:
         """x [n, size]."""
-        return unit(torch.cat([self.camera(image), self.lidar(scan)], dim=1), self.camera.size)
+        return unit(super().features(inputs), self.sizes)
 
     def head(self, features: Tensor) -> Tensor:
         """m(x), the turn times g, clipped."""
@@ -59,17 +60,16 @@ class KernelNet(Network):
         actions = (self._k(features) @ a).float() * torch.cat([torch.ones(1), self.gain])
         return actions.clamp(-1.0, 1.0)
 
-    def deviation(self, scan: Tensor, image: Tensor) -> Tensor:
+    def deviation(self, inputs: Inputs) -> Tensor:
         """sd(x) [n, 2] of the mean's two actions."""
-        k, (p, _) = self._k(self.features(scan, image)), self._solve()
+        k, (p, _) = self._k(self.features(inputs)), self._solve()
         variance = 1.0 - torch.einsum("ni,ij,nj->n", k, p, k)
         return variance.clamp(min=0.0).sqrt()[:, None].float() * self.scale
 
     def doubts(self, features: Features) -> bool:
         """Whether it knows less here than anywhere in the runs that proved it."""
         with torch.inference_mode():
-            scan, image = torch.from_numpy(features.scan)[None], torch.from_numpy(features.image)[None]
-            return bool(self.deviation(scan, image)[0, ANGULAR] > self.limit[0])
+            return bool(self.deviation(batch_of_one(features))[0, ANGULAR] > self.limit[0])
 
     @property
     def examples(self) -> int:
@@ -84,7 +84,7 @@ class KernelNet(Network):
             raise ValueError("a kernel without width or noise")
 
     def _k(self, x: Tensor) -> Tensor:
-        return kernel(x, self.x, self.camera.size, (float(self.lengths[0]), float(self.lengths[1])))
+        return kernel(x, self.x, self.sizes, self.lengths.tolist())
 
     def _solve(self) -> tuple[Tensor, Tensor]:
         """P and A."""

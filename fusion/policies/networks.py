@@ -1,12 +1,12 @@
-"""The three networks of Appendix B: camera, lidar, and the fusion of both.
+"""The networks of Appendix B: one for each sensor's expert, and the fusion of all that a novice sees.
 
-Leaky ReLU with slope 0.3, valid padding, Glorot initialisation, tanh outputs. All three take both sensors, so that
-whoever drives or trains one need not know which it is; an expert looks at its own sensor only.
+Leaky ReLU with slope 0.3, valid padding, stride 1, Glorot initialisation, tanh outputs. Every network is asked with all
+features by name, and looks at its own, so that whoever drives or trains one need not know which they are.
 """
 
 from abc import ABC, abstractmethod
-from collections.abc import Mapping
-from typing import Any, ClassVar, Literal
+from collections.abc import Mapping, Sequence
+from typing import Any, Self
 
 import numpy as np
 import torch
@@ -14,48 +14,51 @@ from numpy.typing import NDArray
 from torch import Tensor, nn
 from torch.nn.functional import leaky_relu, max_pool2d
 
-from lira.hal.messages import Action, FloatArray
+from lira.fusion.preprocess import MODALITIES, Features, Shape
+from lira.hal.messages import Action
 
 SLOPE = 0.3
-HIDDEN = 64  # units of a lidar layer
+HIDDEN = 64  # units of a scan trunk's layer
 FUSION_HIDDEN = 128
-IMAGE_PX = 32
 
-Kind = Literal["camera", "lidar", "fusion", "kernel"]
+Inputs = Mapping[str, Tensor]
+"""A batch of features by name, float32 [n, *shape]."""
 Weights = dict[str, NDArray[np.float32]]
 """All parameters of a network by name, detached from it."""
 
 
-class CameraTrunk(nn.Module):
-    """conv3x3(f) -> conv3x3(f) -> maxpool 2. Image float32 [n, px, px] -> [n, size].
+class PictureTrunk(nn.Module):
+    """conv3x3(f) -> conv3x3(f) -> maxpool 2. Picture float32 [n, px, px] -> [n, size].
 
     `reduced_precision`: convolve in bfloat16, which trains twice as fast on a processor that has it.
     """
 
-    def __init__(self, filters: int, px: int) -> None:
+    def __init__(self, shape: Shape, filters: int) -> None:
         super().__init__()
-        self.filters, self.px = filters, px
+        self.shape, self.filters = shape, filters
         self.reduced_precision = False
         self.conv1 = nn.Conv2d(1, filters, 3)
         self.conv2 = nn.Conv2d(filters, filters, 3)
-        self.size = filters * ((px - 4) // 2) ** 2
+        self.size = filters * ((shape[0] - 4) // 2) ** 2
         self.to(memory_format=torch.channels_last)  # type: ignore[call-overload]
 
     def forward(self, image: Tensor) -> Tensor:
-        """Return the features of a batch of images."""
+        """Return the features of a batch of pictures."""
         with torch.autocast("cpu", torch.bfloat16, enabled=self.reduced_precision):
             hidden = leaky_relu(self.conv1(image.unsqueeze(1)), SLOPE, inplace=True)
             # Pooled before the rectifier: it is monotonic, so the result is the same for a quarter of the work.
             return leaky_relu(max_pool2d(self.conv2(hidden), 2), SLOPE, inplace=True).flatten(1).float()
 
 
-class LidarTrunk(nn.Module):
+class ScanTrunk(nn.Module):
     """64 -> 64. Scan float32 [n, bins] -> [n, 64]."""
 
-    def __init__(self, bins: int) -> None:
+    filters = 0  # it has none
+
+    def __init__(self, shape: Shape) -> None:
         super().__init__()
-        self.bins = bins
-        self.fc1 = nn.Linear(bins, HIDDEN)
+        self.shape = shape
+        self.fc1 = nn.Linear(shape[0], HIDDEN)
         self.fc2 = nn.Linear(HIDDEN, HIDDEN)
         self.size = HIDDEN
 
@@ -64,32 +67,65 @@ class LidarTrunk(nn.Module):
         return leaky_relu(self.fc2(leaky_relu(self.fc1(scan), SLOPE)), SLOPE)
 
 
-class Network(nn.Module, ABC):
-    """A policy: `features` is the trunk's output, `head` turns it into actions [n, 2] in [-1, 1]."""
+Trunk = PictureTrunk | ScanTrunk
 
-    kind: ClassVar[Kind]
+
+def new_trunk(name: str, shape: Shape, filters: int) -> Trunk:
+    """Make what looks at a feature, by its name. Raises `ValueError` for a shape that it cannot have."""
+    if name not in MODALITIES:
+        raise ValueError(f"a feature '{name}' that is none of {', '.join(MODALITIES)}")
+    MODALITIES[name].check(shape)
+    if MODALITIES[name].trunk == "scan":
+        return ScanTrunk(shape)
+    if filters < 1:
+        raise ValueError(f"a {name} seen by a trunk without filters")
+    return PictureTrunk(shape, filters)
+
+
+class Network(nn.Module, ABC):
+    """A policy: `features` is what its trunks make of what is seen, `head` turns that into actions [n, 2] in [-1, 1].
+
+    `kind` is the sensor whose expert it is, "fusion" or "kernel".
+    """
+
+    kind: str
+
+    @property
+    @abstractmethod
+    def trunks(self) -> dict[str, Trunk]:
+        """What looks at each feature, by the feature's name and in order."""
+
+    @property
+    def shapes(self) -> dict[str, Shape]:
+        """The features it looks at, and their shapes."""
+        return {name: trunk.shape for name, trunk in self.trunks.items()}
+
+    @property
+    def filters(self) -> int:
+        """Width of the trunks that see pictures; 0 without any."""
+        return max(trunk.filters for trunk in self.trunks.values())
 
     @property
     def examples(self) -> int:
         """How many labels it drives by; 0 for one that has only been trained on them."""
         return 0
 
-    @abstractmethod
-    def features(self, scan: Tensor, image: Tensor, /) -> Tensor:
-        """Scan float32 [n, bins] and image float32 [n, px, px] -> trunk output [n, size]."""
+    def features(self, inputs: Inputs) -> Tensor:
+        """What the trunks make of a batch [n, size], one behind the other."""
+        return torch.cat([trunk(inputs[name]) for name, trunk in self.trunks.items()], dim=1)
 
     @abstractmethod
     def head(self, features: Tensor) -> Tensor:
         """Trunk output [n, size] -> actions [n, 2]."""
 
-    def forward(self, scan: Tensor, image: Tensor) -> Tensor:
-        """Scan float32 [n, bins] and image float32 [n, px, px] -> actions [n, 2]."""
-        return self.head(self.features(scan, image))
+    def forward(self, inputs: Inputs) -> Tensor:
+        """A batch of features -> actions [n, 2]."""
+        return self.head(self.features(inputs))
 
-    def act(self, scan: FloatArray, image: FloatArray) -> Action:
-        """Return the action for one step: scan float32 [bins], image float32 [px, px]."""
+    def act(self, seen: Features) -> Action:
+        """Return the action for one step."""
         with torch.inference_mode():
-            linear, angular = self(torch.from_numpy(scan)[None], torch.from_numpy(image)[None])[0].tolist()
+            linear, angular = self(batch_of_one(seen))[0].tolist()
         return linear, angular
 
     def weights(self) -> Weights:
@@ -111,80 +147,80 @@ class Network(nn.Module, ABC):
             tensor.copy_(torch.from_numpy(weights[name]))
 
 
-class CameraNet(Network):
-    """The camera expert: its trunk -> FC 2."""
+class ExpertNet(Network):
+    """An expert that sees one feature: its trunk -> FC 2."""
 
-    kind = "camera"
-
-    def __init__(self, filters: int, *, px: int = IMAGE_PX, seed: int = 0) -> None:
+    def __init__(self, name: str, shape: Shape, filters: int = 0, *, seed: int = 0) -> None:
         super().__init__()
-        self.trunk = CameraTrunk(filters, px)
+        self.trunk = new_trunk(name, shape, filters)
         self.out = nn.Linear(self.trunk.size, 2)
+        self.sees = name
+        self.kind = MODALITIES[name].sensor
         initialise(self, seed)
 
-    def features(self, _scan: Tensor, image: Tensor, /) -> Tensor:
-        """Look at the image only."""
-        return self.trunk(image)  # type: ignore[no-any-return]
+    @property
+    def trunks(self) -> dict[str, Trunk]:
+        """Its only one."""
+        return {self.sees: self.trunk}
 
     def head(self, features: Tensor) -> Tensor:
         """FC 2."""
         return torch.tanh(self.out(features))
 
 
-class LidarNet(Network):
-    """The lidar expert: its trunk -> FC 2."""
+class SeeingNet(Network):
+    """A network with a trunk for each of its features, which is called by the sensor's name."""
 
-    kind = "lidar"
-
-    def __init__(self, bins: int, *, seed: int = 0) -> None:
+    def __init__(self, shapes: Mapping[str, Shape], filters: int) -> None:
         super().__init__()
-        self.trunk = LidarTrunk(bins)
-        self.out = nn.Linear(self.trunk.size, 2)
-        initialise(self, seed)
+        for name, shape in shapes.items():
+            trunk = new_trunk(name, shape, filters)
+            self.add_module(MODALITIES[name].sensor, trunk)
+        self._sees = tuple(shapes)
 
-    def features(self, scan: Tensor, _image: Tensor, /) -> Tensor:
-        """Look at the scan only."""
-        return self.trunk(scan)  # type: ignore[no-any-return]
+    @property
+    def trunks(self) -> dict[str, Trunk]:
+        """One for each feature."""
+        return {name: getattr(self, MODALITIES[name].sensor) for name in self._sees}
 
-    def head(self, features: Tensor) -> Tensor:
-        """FC 2."""
-        return torch.tanh(self.out(features))
+    def see_as(self, experts: Sequence[ExpertNet]) -> Self:
+        """Take copies of the experts' trunks."""
+        for expert in experts:
+            self.trunks[expert.sees].load_state_dict(expert.trunk.state_dict())
+        return self
 
 
-class FusionNet(Network):
-    """The novice: both trunks, concatenated -> 128 -> 128 -> 2."""
+class FusionNet(SeeingNet):
+    """The novice: the trunks, concatenated -> 128 -> 128 -> 2."""
 
     kind = "fusion"
 
-    def __init__(self, bins: int, filters: int, *, px: int = IMAGE_PX, seed: int = 0) -> None:
-        super().__init__()
-        self.camera = CameraTrunk(filters, px)
-        self.lidar = LidarTrunk(bins)
-        self.fc1 = nn.Linear(self.camera.size + self.lidar.size, FUSION_HIDDEN)
+    def __init__(self, shapes: Mapping[str, Shape], filters: int, *, seed: int = 0) -> None:
+        super().__init__(shapes, filters)
+        self.fc1 = nn.Linear(sum(trunk.size for trunk in self.trunks.values()), FUSION_HIDDEN)
         self.fc2 = nn.Linear(FUSION_HIDDEN, FUSION_HIDDEN)
         self.out = nn.Linear(FUSION_HIDDEN, 2)
         initialise(self, seed)
 
     @classmethod
-    def from_experts(cls, camera: CameraNet, lidar: LidarNet, *, seed: int = 0) -> "FusionNet":
+    def from_experts(cls, experts: Sequence[ExpertNet], *, seed: int = 0) -> "FusionNet":
         """Build a novice whose trunks are copies of the experts' trunks. The learner can keep them frozen."""
-        network = cls(lidar.trunk.bins, camera.trunk.filters, px=camera.trunk.px, seed=seed)
-        network.camera.load_state_dict(camera.trunk.state_dict())
-        network.lidar.load_state_dict(lidar.trunk.state_dict())
-        return network
-
-    def trunk(self, scan: Tensor, image: Tensor) -> Tensor:
-        """Both trunks, concatenated: camera first."""
-        return torch.cat([self.camera(image), self.lidar(scan)], dim=1)
-
-    def features(self, scan: Tensor, image: Tensor, /) -> Tensor:
-        """Look at both sensors."""
-        return self.trunk(scan, image)
+        return cls(*seen_by(experts), seed=seed).see_as(experts)
 
     def head(self, features: Tensor) -> Tensor:
         """128 -> 128 -> 2: the fusion layers, all that trains when the trunks are frozen."""
         hidden = leaky_relu(self.fc2(leaky_relu(self.fc1(features), SLOPE)), SLOPE)
         return torch.tanh(self.out(hidden))
+
+
+def seen_by(experts: Sequence[ExpertNet]) -> tuple[dict[str, Shape], int]:
+    """The features that some experts see together, by name, and the width of those who see pictures."""
+    return {expert.sees: expert.trunk.shape for expert in experts}, max(expert.filters for expert in experts)
+
+
+def batch_of_one(seen: Features) -> dict[str, Tensor]:
+    """What was seen at one step as a batch [1, *shape] by name. The memory is shared."""
+    return {name: torch.from_numpy(array)[None] for name, array in seen.items()}
 
 
 def initialise(network: nn.Module, seed: int) -> None:

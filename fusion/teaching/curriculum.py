@@ -111,5 +111,5 @@ CURRICULA = {
 
 
 def curriculum(kind: str, task: str) -> Curriculum:
-    """Return what a task's expert is trained on; a lidar expert may be another task's, see `Task`."""
-    return CURRICULA[TASKS[task].lidar if kind == "lidar" else task][kind]
+    """Return what a task's expert is trained on; it may be another task's, see `Task`."""
+    return CURRICULA[TASKS[task].owner(kind)][kind]

@@ -6,14 +6,14 @@ from lira.fusion.learning.novice import LearningSettings, NetworkNovice
 from lira.fusion.methods.base import Expert
 from lira.fusion.preprocess import Features
 
-FEATURES = Features(np.full(101, 0.9, np.float32), np.full((32, 32), 0.5, np.float32))
+FEATURES = Features(scan=np.full(101, 0.9, np.float32), image=np.full((32, 32), 0.5, np.float32))
 
 
 class FixedNetwork:
     def __init__(self, action):
         self.action = action
 
-    def act(self, scan, image):
+    def act(self, seen):
         return self.action
 
     def load_weights(self, weights):

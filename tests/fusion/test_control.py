@@ -147,7 +147,7 @@ def test_without_ground_truth_there_is_no_scripted_teacher():
     [
         ({"scan": None}, "nothing new from the lidar"),
         ({"image": None}, "nothing new from the camera"),
-        ({"scan": None, "image": None}, "nothing new from the lidar and the camera"),
+        ({"scan": None, "image": None}, "nothing new from the camera and the lidar"),
     ],
 )
 def test_without_a_sensor_it_stands_and_decides_nothing(missing, trouble):

@@ -6,15 +6,19 @@ import subprocess
 import sys
 import textwrap
 import time
+import zlib
 from dataclasses import replace
 from pathlib import Path
 
+import msgspec
 import numpy as np
 import pytest
 
+from lira.fusion.log.label_file import Format
 from lira.fusion.log.label_log import Demonstration, DemonstrationLog, read_demonstrations
+from lira.fusion.preprocess import Features, shapes_of
 from lira.hal.errors import StorageError
-from lira.hal.profile import load_profile
+from lira.hal.profile import Depth, load_profile
 
 SIM = load_profile("thesis-sim")
 REAL = load_profile("rosbot2")
@@ -22,8 +26,12 @@ REAL = load_profile("rosbot2")
 
 def demonstration(k: int = 0, profile=SIM) -> Demonstration:
     rng = np.random.default_rng(k)
-    shape = profile.features
-    gray = rng.integers(0, 256, (shape.image_px, shape.image_px))
+    arrays = {
+        name: rng.random(shape, dtype=np.float32)
+        if name == "scan"
+        else (rng.integers(0, 256, shape) / 255).astype(np.float32)
+        for name, shape in shapes_of(profile).items()
+    }
     return Demonstration(
         stamp_s=0.2 * k,
         observation=k,
@@ -32,14 +40,14 @@ def demonstration(k: int = 0, profile=SIM) -> Demonstration:
         action=(0.1 * (k % 10), -1.0),
         novice=(0.5, 1 / 3),
         stored=k % 2 == 0,
-        scan=rng.random(shape.bins, dtype=np.float32),
-        image=(gray / 255).astype(np.float32),
+        features=Features(**arrays),
     )
 
 
 def same(one: Demonstration, other: Demonstration) -> bool:
-    arrays = np.array_equal(one.scan, other.scan) and np.array_equal(one.image, other.image)
-    return arrays and replace(one, scan=0, image=0, run=0) == replace(other, scan=0, image=0, run=0)
+    mine, theirs = one.features, other.features
+    arrays = mine.keys() == theirs.keys() and all(np.array_equal(mine[name], theirs[name]) for name in mine)
+    return arrays and replace(one, features=None, run=0) == replace(other, features=None, run=0)
 
 
 def write(path: Path, numbers, profile=SIM) -> None:
@@ -172,7 +180,7 @@ def test_a_log_of_another_robot_is_refused_and_left_alone(tmp_path):
     path = tmp_path / "log"
     write(path, range(2))
     before = path.read_bytes()
-    with pytest.raises(StorageError, match=r"'thesis-sim' \(101 bins, 32 px\), not for 'rosbot2' \(130 bins, 32 px\)"):
+    with pytest.raises(StorageError, match=r"'thesis-sim' \(scan 101, image 32x32\), not for 'rosbot2' \(scan 130"):
         DemonstrationLog(path, REAL)
     assert path.read_bytes() == before
 
@@ -281,3 +289,43 @@ def test_a_log_from_before_runs_were_counted_is_read_as_it_was(tmp_path):
     record = data[-2 * size : -size]
     assert struct.unpack_from("<dqi?", record) == (1.0, 5, 2, False)
     assert [(each.lap, each.run) for each in read_demonstrations(path)] == [(2, 0), (0, 1)]
+
+
+def first_version(path: Path, numbers) -> None:
+    """Write a log as it was before features had names: two sizes in the header, the same records."""
+    write(path, numbers)
+    header = struct.pack("<8sHHHH", b"LIRADEMO", 1, 101, 32, len(SIM.name)) + SIM.name.encode()
+    begin = len(Format.of(SIM).header())
+    path.write_bytes(header + struct.pack("<I", zlib.crc32(header)) + path.read_bytes()[begin:])
+
+
+def test_a_log_of_the_first_version_is_read_and_goes_on_as_it_is(tmp_path):
+    path = tmp_path / "log"
+    first_version(path, range(3))
+    assert holds(path, range(3))
+    before = path.read_bytes()
+    with DemonstrationLog(path, SIM) as log:
+        assert (log.count, log.run, log.repaired_bytes) == (3, 1, 0)
+        log.append(demonstration(3))
+    assert path.read_bytes().startswith(before)
+    assert holds(path, range(4))
+
+
+def test_a_damaged_log_of_the_first_version_is_healed(tmp_path):
+    path = tmp_path / "log"
+    first_version(path, range(3))
+    data = bytearray(path.read_bytes())
+    data[len(data) // 2] ^= 0xFF
+    path.write_bytes(data)
+    DemonstrationLog(path, SIM, say=lambda _: None).close()
+    assert holds(path, [0, 2])
+
+
+def test_a_log_holds_whatever_features_the_profile_chooses(tmp_path):
+    depth = Depth(width_px=64, height_px=48, range_min_m=0.1, range_max_m=4.0)
+    shape = msgspec.structs.replace(SIM.features, inputs=("image", "scan", "depth"))
+    robot = msgspec.structs.replace(SIM, depth=depth, features=shape)
+    write(tmp_path / "log", range(4), robot)
+    assert holds(tmp_path / "log", range(4), robot)
+    with pytest.raises(StorageError, match=r"image 32x32, depth 32x32\), not for 'thesis-sim' \(scan 101, im"):
+        DemonstrationLog(tmp_path / "log", SIM)

@@ -5,6 +5,7 @@ import math
 import numpy as np
 import pytest
 import torch
+from nets import camera_net, lidar_net
 from taught import FEATURES, make_novice
 
 from lira.fusion.learning.learner import Label, Learner
@@ -12,7 +13,8 @@ from lira.fusion.methods.base import STAND, Call
 from lira.fusion.methods.doubt import Doubtful, DoubtLog, doubt, threshold
 from lira.fusion.methods.rivals.hg_dagger import HgDagger
 from lira.fusion.policies.ensemble import EnsembleNet
-from lira.fusion.policies.networks import CameraNet, FusionNet, LidarNet
+from lira.fusion.policies.networks import FusionNet
+from lira.fusion.preprocess import Features
 
 
 def opinions(spread):
@@ -86,15 +88,15 @@ def labels(count):
     rng = np.random.default_rng(0)
     for _ in range(count):
         scan, image = rng.random(101, dtype=np.float32), rng.integers(0, 256, (32, 32)) / 255
-        yield Label(scan, image.astype(np.float32), (float(scan[0]), -0.5), "human")
+        yield Label(Features(scan=scan, image=image.astype(np.float32)), (float(scan[0]), -0.5), "human")
 
 
 @pytest.mark.usefixtures("_one_thread")
 @pytest.mark.parametrize("frozen", [True, False])
 def test_the_ensemble_learns_too_and_changes_nothing_for_the_novice(frozen):
-    plain = FusionNet.from_experts(CameraNet(16, seed=4), LidarNet(101, seed=5), seed=1)
+    plain = FusionNet.from_experts([camera_net(16, seed=4), lidar_net(101, seed=5)], seed=1)
     ensemble = EnsembleNet(plain, members=3, seed=7)
-    seen = next(labels(1))
+    seen = next(labels(1)).features
     before = ensemble.opinions(seen)
     assert before.shape == (3, 2)
     assert doubt(before) > 0

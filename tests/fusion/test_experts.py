@@ -1,5 +1,6 @@
 import numpy as np
 import pytest
+from nets import camera_net, fusion_net, lidar_net
 
 from lira.fusion.experts.files import folder_of
 from lira.fusion.experts.load import as_expert, load_alone, load_network, load_policy
@@ -9,18 +10,18 @@ from lira.fusion.methods.doubt import Doubtful
 from lira.fusion.methods.shield import Shielded
 from lira.fusion.policies.checkpoint import Checkpoint, save_checkpoint
 from lira.fusion.policies.kernel_net import KernelNet
-from lira.fusion.policies.networks import CameraNet, FusionNet, LidarNet
-from lira.fusion.preprocess import Features
+from lira.fusion.policies.networks import ExpertNet
+from lira.fusion.preprocess import Features, shapes_of
 from lira.hal.errors import ConfigError, StorageError
 from lira.hal.profile import load_profile
 from lira.sim_backend.catalogue import load_world
 
 SIM, REAL = load_profile("thesis-sim"), load_profile("rosbot2")
-FEATURES = Features(np.full(101, 0.5, np.float32), np.full((32, 32), 0.5, np.float32))
+FEATURES = Features(scan=np.full(101, 0.5, np.float32), image=np.full((32, 32), 0.5, np.float32))
 
 
-def save(path, kind, network, bins, filters, profile="rosbot2", cruise=None):
-    save_checkpoint(path, network, Checkpoint(kind, bins, filters, profile, cruise, "lira train-expert", 0))
+def save(path, network, profile="rosbot2", cruise=None):
+    save_checkpoint(path, network, Checkpoint.of(network, profile, "lira train-expert", 0, cruise))
     return str(path)
 
 
@@ -43,7 +44,7 @@ def test_every_task_has_its_experts_for_its_robot(task, name):
     profile = load_profile(TASKS[task].profile)
     assert load_policy(f"{name}-expert", profile, task).name == name
     _, checkpoint = load_network(name, profile, task)
-    owner = TASKS[task].lidar if name == "lidar" else task
+    owner = TASKS[task].owner(name)
     words = "" if owner == DEFAULT else f" --task {owner}"
     assert checkpoint.provenance == f"lira train-expert {name}{words} --profile {profile.name} --seed 0"
     assert checkpoint.labels > 30
@@ -61,9 +62,9 @@ def test_the_experts_of_a_world_are_those_of_its_task():
 
 
 def test_a_pair_of_ones_own_is_a_folder(tmp_path):
-    for kind, network in (("camera", CameraNet(16)), ("lidar", LidarNet(101))):
-        save(tmp_path / f"{kind}.safetensors", kind, network, 101, 16, cruise=(0.9, 0.01))
-        assert load_policy(f"{kind}-expert", SIM, str(tmp_path)).cruise == (0.9, 0.01)
+    for network in (camera_net(16), lidar_net(101)):
+        save(tmp_path / f"{network.kind}.safetensors", network, cruise=(0.9, 0.01))
+        assert load_policy(f"{network.kind}-expert", SIM, str(tmp_path)).cruise == (0.9, 0.01)
 
 
 def test_a_folder_without_the_expert_says_how_to_make_it(tmp_path):
@@ -92,23 +93,26 @@ def test_a_profile_without_an_expert_says_how_to_train_one():
 
 
 def test_a_file_of_ones_own_is_named_after_its_sensor(tmp_path):
-    path = save(tmp_path / "mine.safetensors", "lidar", LidarNet(130, seed=1), 130, 32, cruise=(0.9, 0.01))
+    path = save(tmp_path / "mine.safetensors", lidar_net(130, seed=1), cruise=(0.9, 0.01))
     expert = load_policy(path, REAL)
     assert (expert.name, expert.cruise) == ("lidar", (0.9, 0.01))
 
 
+DEPTH_NET = ExpertNet("depth", (32, 32), 16)  # of a robot that learns from depth
+
+
 @pytest.mark.parametrize(
-    ("network", "bins"),
-    [(LidarNet(130), 130), (CameraNet(32), 101), (FusionNet(130, 32), 130), (FusionNet(101, 32), 101)],
+    "network", [lidar_net(130), camera_net(32), fusion_net(130, 32), fusion_net(101, 32), DEPTH_NET]
 )
-def test_the_checkpoint_of_another_robot_is_refused_with_both_names(tmp_path, network, bins):
-    path = save(tmp_path / "other.safetensors", network.kind, network, bins, 32)
-    with pytest.raises(ConfigError, match=r"trained for 'rosbot2'.*not for 'thesis-sim' \(101 beams, 16 filters\)"):
+def test_the_checkpoint_of_another_robot_is_refused_with_both_names(tmp_path, network):
+    path = save(tmp_path / "other.safetensors", network)
+    own = r"'thesis-sim' \(image 32x32, scan 101, filters 16\)"
+    with pytest.raises(ConfigError, match=rf"trained for 'rosbot2'.*not for {own}"):
         load_network(path, SIM)
 
 
 def test_what_an_expert_does_not_see_may_differ(tmp_path):
-    path = save(tmp_path / "camera.safetensors", "camera", CameraNet(16), 130, 16)
+    path = save(tmp_path / "camera.safetensors", camera_net(16))
     assert load_policy(path, SIM).name == "camera"
 
 
@@ -118,8 +122,8 @@ def test_a_missing_file_is_one_clear_error(tmp_path):
 
 
 def test_an_expert_is_a_black_box_that_sees_both_sensors():
-    network = FusionNet(101, 16, seed=3)
-    assert as_expert("both", network, None).act(FEATURES) == network.act(FEATURES.scan, FEATURES.image)
+    network = fusion_net(101, 16, seed=3)
+    assert as_expert("both", network, None).act(FEATURES) == network.act(FEATURES)
     assert as_expert("both", network, None).cruise == (1.0, 0.0)
 
 
@@ -130,8 +134,7 @@ def test_a_policy_that_cannot_tell_what_it_knows_cannot_ask():
 
 
 def test_a_novice_of_plus_can(tmp_path):
-    bins, filters = SIM.features.bins, SIM.features.filters
-    path = save(tmp_path / "novice.safetensors", "kernel", KernelNet(bins, filters), bins, filters, SIM.name)
+    path = save(tmp_path / "novice.safetensors", KernelNet(shapes_of(SIM), SIM.features.filters), SIM.name)
     assert isinstance(load_alone(path, SIM, ask=True), Doubtful)
     assert isinstance(load_alone(path, SIM), Alone)
 

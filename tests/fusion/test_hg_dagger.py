@@ -1,13 +1,13 @@
 import numpy as np
 import pytest
+from nets import camera_net
 
 from lira.fusion.learning.novice import LearningSettings, NetworkNovice
 from lira.fusion.methods.base import STAND, Call
 from lira.fusion.methods.rivals.hg_dagger import HgDagger
-from lira.fusion.policies.networks import CameraNet
 from lira.fusion.preprocess import Features
 
-FEATURES = Features(np.zeros(101, np.float32), np.zeros((32, 32), np.float32))
+FEATURES = Features(scan=np.zeros(101, np.float32), image=np.zeros((32, 32), np.float32))
 FAR = (-1.0, 1.0)  # from anything a fresh network does
 
 
@@ -33,7 +33,7 @@ class Trainer:
 
 @pytest.fixture
 def method():
-    network = CameraNet(16)
+    network = camera_net(16)
     return HgDagger(NetworkNovice(network, Trainer(network), LearningSettings(labels_per_step=2)))
 
 

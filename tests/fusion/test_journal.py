@@ -10,7 +10,7 @@ from lira.fusion.preprocess import Features
 from lira.hal.messages import STOP, Applied, CourseState, ExpertView, LabelCounts, Observation
 
 IMAGE = (np.arange(32 * 32).reshape(32, 32) % 256 / 255).astype(np.float32)
-FEATURES = Features(np.linspace(0, 1, 101, dtype=np.float32), IMAGE)
+FEATURES = Features(scan=np.linspace(0, 1, 101, dtype=np.float32), image=IMAGE)
 STATE = CourseState(2.0, 1.0, 0.5, 0.1, 0.9, 0.2, 1.1, float("nan"), clearance_m=float("inf"))
 VIEWS = (ExpertView("camera", (1.0, 0.1), 0.3, True), ExpertView("lidar", (1.0, 0.0), 0.0, False))
 
@@ -55,8 +55,7 @@ def test_a_label_goes_to_the_log_with_what_was_seen_whether_stored_or_not(desk):
         label = desk.note(step("camera", label=(1.0, 0.1), stored=stored))["label"]
         assert (label.stamp_s, label.observation, label.lap, label.source) == (2.0, 17, 2, "camera")
         assert (label.action, label.novice, label.stored) == ((1.0, 0.1), (0.7, 0.0), stored)
-        assert label.scan is FEATURES.scan
-        assert label.image is IMAGE
+        assert label.features is FEATURES
 
 
 def test_a_step_without_a_label_keeps_none(desk):

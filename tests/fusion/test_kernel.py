@@ -9,6 +9,8 @@ import torch
 from lira.fusion.policies.kernel import GAINS, KernelRidge, KernelSettings, kernel, unit
 
 CAMERA, LIDAR = 6, 4
+SIZES = {"image": CAMERA, "scan": LIDAR}
+BOTH = (CAMERA, LIDAR)
 PLAIN = KernelSettings(contradicts=None)
 
 
@@ -17,11 +19,11 @@ def states(count, seed=0):
     random = torch.Generator().manual_seed(seed)
     middles = torch.randn(4, CAMERA + LIDAR, generator=random)
     near = middles[torch.arange(count) % 4] + 0.3 * torch.randn(count, CAMERA + LIDAR, generator=random)
-    return unit(near, CAMERA)
+    return unit(near, BOTH)
 
 
 def taught(x, actions, settings=PLAIN, *, human=None, groups=None, weights=None):
-    ridge = KernelRidge(CAMERA + LIDAR, CAMERA, settings)
+    ridge = KernelRidge(SIZES, settings)
     for i, action in enumerate(actions):
         ridge.add(
             x[i],
@@ -42,24 +44,35 @@ def test_each_part_of_a_state_has_length_1_and_a_state_is_like_itself():
     x = states(5)
     assert torch.allclose(x[:, :CAMERA].norm(dim=1), torch.ones(5))
     assert torch.allclose(x[:, CAMERA:].norm(dim=1), torch.ones(5))
-    assert torch.allclose(kernel(x, x, CAMERA, (0.4, 0.4)).diagonal(), torch.ones(5, dtype=torch.float64), atol=1e-5)
+    assert torch.allclose(kernel(x, x, BOTH, (0.4, 0.4)).diagonal(), torch.ones(5, dtype=torch.float64), atol=1e-5)
 
 
 def test_a_part_that_is_zero_stays_finite():
-    assert torch.isfinite(unit(torch.zeros(1, CAMERA + LIDAR), CAMERA)).all()
+    assert torch.isfinite(unit(torch.zeros(1, CAMERA + LIDAR), BOTH)).all()
 
 
 def test_the_kernel_is_gaussian_in_both_parts():
     x = states(6)
     squared = [torch.cdist(part, part).square().double() for part in (x[:, :CAMERA], x[:, CAMERA:])]
     expected = torch.exp(-squared[0] / (2 * 0.5**2) - squared[1] / (2 * 0.3**2))
-    assert torch.allclose(kernel(x, x, CAMERA, (0.5, 0.3)), expected, atol=1e-4)
+    assert torch.allclose(kernel(x, x, BOTH, (0.5, 0.3)), expected, atol=1e-4)
+
+
+def test_each_feature_has_a_length_scale_by_its_name_however_many_there_are():
+    sizes = {"image": 6, "scan": 4, "depth": 5}
+    x = unit(torch.randn(7, 15, generator=torch.Generator().manual_seed(1)), tuple(sizes.values()))
+    ridge = KernelRidge(sizes, KernelSettings(length=0.5, lengths=(("depth", 0.3),)))
+    for i in range(7):
+        ridge.add(x[i], (1.0, 0.0), 1.0, human=True, group=i, label=i)
+    squared = [torch.cdist(part, part).square().double() for part in x.split(list(sizes.values()), dim=1)]
+    expected = torch.exp(-(squared[0] + squared[1]) / (2 * 0.5**2) - squared[2] / (2 * 0.3**2))
+    assert torch.allclose(ridge.k(x[3]), expected[3], atol=1e-4)
 
 
 def test_one_by_one_it_comes_to_what_solving_at_once_does():
     x, labels, weights = states(30), actions(30), [1.0 + i % 3 for i in range(30)]
     ridge = taught(x[:29], labels[:29], weights=weights)
-    k, at = kernel(x[:29], x[:29], CAMERA, (0.4, 0.4)), kernel(x[:29], x[29:], CAMERA, (0.4, 0.4))[:, 0]
+    k, at = kernel(x[:29], x[:29], BOTH, (0.4, 0.4)), kernel(x[:29], x[29:], BOTH, (0.4, 0.4))[:, 0]
     noise = torch.diag(0.1 / torch.tensor(weights[:29], dtype=torch.float64))
     y = torch.tensor(labels[:29], dtype=torch.float64)
     mean = at @ torch.linalg.solve(k + noise, y)
@@ -80,7 +93,7 @@ def test_it_knows_what_it_was_shown_and_stands_where_it_was_shown_nothing():
 
 
 def test_before_any_label_it_stands():
-    ridge = KernelRidge(CAMERA + LIDAR, CAMERA, KernelSettings())
+    ridge = KernelRidge(SIZES, KernelSettings())
     assert ridge.act(states(1)[0], ridge.gain) == (0.0, 0.0)
     assert ridge.fit.deviation(ridge.k(states(1)[0])).tolist() == [1.0, 1.0]
 
@@ -102,7 +115,7 @@ def test_a_group_is_left_out_as_if_it_had_never_been_shown():
 def test_the_deviation_is_calibrated():
     """On a function drawn from the prior, 95 % of the errors are below two deviations, more or less."""
     x = states(400, seed=1)
-    k = kernel(x, x, CAMERA, (0.4, 0.4)) + 1e-4 * torch.eye(400, dtype=torch.float64)
+    k = kernel(x, x, BOTH, (0.4, 0.4)) + 1e-4 * torch.eye(400, dtype=torch.float64)
     draw = (
         0.3
         * torch.linalg.cholesky(k)
@@ -123,7 +136,7 @@ def test_the_deviation_is_calibrated():
 class TestSettingAside:
     def scene(self, *, human):
         """Twelve labels of one mind in much the same place, and one that turns the other way."""
-        x = unit(torch.ones(13, CAMERA + LIDAR) + 0.05 * states(13), CAMERA)
+        x = unit(torch.ones(13, CAMERA + LIDAR) + 0.05 * states(13), BOTH)
         labels = [(1.0, 0.9)] * 12 + [(1.0, -0.9)]
         return taught(x, labels, KernelSettings(), human=human), x
 
@@ -135,12 +148,12 @@ class TestSettingAside:
         assert ridge.act(x[12]) == pytest.approx(plain.act(x[12]), abs=1e-6)
 
     def test_an_expert_goes_before_a_human(self):
-        x = unit(torch.ones(2, CAMERA + LIDAR) + 0.01 * states(2), CAMERA)
+        x = unit(torch.ones(2, CAMERA + LIDAR) + 0.01 * states(2), BOTH)
         ridge = taught(x, [(1.0, 1.0), (1.0, -1.0)], KernelSettings(), human=[True, False])
         assert ridge.fit.used.tolist() == [True, False]
 
     def test_it_can_be_left_off(self):
-        x = unit(torch.ones(13, CAMERA + LIDAR) + 0.05 * states(13), CAMERA)
+        x = unit(torch.ones(13, CAMERA + LIDAR) + 0.05 * states(13), BOTH)
         assert taught(x, [(1.0, 0.9)] * 12 + [(1.0, -0.9)]).fit.used.all()
 
 

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-import torch
+from nets import camera_net, lidar_net
 
 from lira.fusion.learning.kernel_novice import KernelNovice
 from lira.fusion.learning.labels import Label, mirror
@@ -12,7 +12,7 @@ from lira.fusion.learning.novice import LearningSettings
 from lira.fusion.policies.checkpoint import Checkpoint, load_checkpoint, save_checkpoint
 from lira.fusion.policies.kernel import KernelSettings
 from lira.fusion.policies.kernel_net import KernelNet
-from lira.fusion.policies.networks import CameraNet, LidarNet
+from lira.fusion.policies.networks import batch_of_one
 from lira.fusion.preprocess import Features
 from lira.hal.errors import StorageError
 from lira.tools.runs.folder import aside_words
@@ -22,11 +22,11 @@ BINS, FILTERS = 21, 4
 
 def seen(seed):
     random = np.random.default_rng(seed)
-    return Features(random.random(BINS, dtype=np.float32), random.random((32, 32), dtype=np.float32))
+    return Features(scan=random.random(BINS, dtype=np.float32), image=random.random((32, 32), dtype=np.float32))
 
 
 def novice(*, mirrored=True, settings=None, **learning):
-    sees = KernelNet.from_experts(CameraNet(FILTERS, seed=1), LidarNet(BINS, seed=2))
+    sees = KernelNet.from_experts([camera_net(FILTERS, seed=1), lidar_net(BINS, seed=2)])
     learning = LearningSettings(**{"human_weight": 3.0} | learning)
     return KernelNovice(sees, learning, settings or KernelSettings(), mirrored=mirrored)
 
@@ -58,25 +58,25 @@ def test_what_it_does_already_is_redundant():
 @pytest.mark.parametrize("mirrored", [True, False])
 def test_left_and_right_are_exchanged_where_it_is_asked_to(mirrored):
     learner = novice(mirrored=mirrored)
-    label = Label(seen(0).scan, seen(0).image, (0.9, -0.7), "human", 3.0)
+    label = Label(seen(0), (0.9, -0.7), "human", 3.0)
     learner.remember(label)
     other = mirror(label)
     expected = (0.9, 0.7) if mirrored else (0.0, 0.0)
     if mirrored:
-        assert learner.act(Features(other.scan, other.image)) == pytest.approx(expected, abs=0.1)
+        assert learner.act(other.features) == pytest.approx(expected, abs=0.1)
     assert len(learner.ridge) == 1 + mirrored
 
 
 def test_what_one_source_shows_in_a_row_is_a_group():
     learner = novice()
     for i, source in enumerate(["camera", "camera", "human", "human", "camera"]):
-        learner.remember(Label(seen(i).scan, seen(i).image, (1.0, 0.0), source))
+        learner.remember(Label(seen(i), (1.0, 0.0), source))
     assert learner.ridge.groups.tolist() == [1, 1, 1, 1, 2, 2, 2, 2, 3, 3]
 
 
 def test_a_label_that_all_others_contradict_is_named_with_who_gave_it():
     learner = novice(mirrored=False)
-    label = Label(seen(0).scan, seen(0).image, (1.0, 0.9), "human")
+    label = Label(seen(0), (1.0, 0.9), "human")
     for _ in range(5):
         learner.remember(label)
     learner.remember(replace(label, action=(1.0, -0.9), source="camera"))
@@ -89,7 +89,7 @@ def test_it_is_less_sure_where_it_has_seen_nothing_like_it():
     learner = novice()
     for i in range(6):
         learner.learn(seen(0), (1.0, 0.3 * (-1) ** i), "human", (0.0, 0.0))
-    far = Features(np.zeros(BINS, np.float32), np.eye(32, dtype=np.float32))
+    far = Features(scan=np.zeros(BINS, np.float32), image=np.eye(32, dtype=np.float32))
     assert learner.deviation(seen(0))[1] < learner.deviation(far)[1]
 
 
@@ -101,8 +101,8 @@ def test_frozen_it_drives_as_the_novice_alone_and_doubts_as_it_does():
     learner = taught()
     network = learner.frozen()
     for each in map(seen, (0, 1, 77)):
-        assert network.act(each.scan, each.image) == pytest.approx(learner.alone(each), abs=1e-4)
-        deviation = network.deviation(torch.from_numpy(each.scan)[None], torch.from_numpy(each.image)[None])[0]
+        assert network.act(each) == pytest.approx(learner.alone(each), abs=1e-4)
+        deviation = network.deviation(batch_of_one(each))[0]
         assert deviation.tolist() == pytest.approx(learner.deviation(each), abs=1e-4)
 
 
@@ -118,13 +118,13 @@ def test_it_knows_what_is_unlike_what_the_human_had_to_show_it():
     assert not learner.knows(seen(0), 0.25)  # before any human
     for i, source in enumerate(["camera", "camera", "camera", "human", "camera", "human"]):
         at = seen(0) if source == "camera" else seen(i)
-        learner.remember(Label(at.scan, at.image, (1.0, 0.1 * i), source))
+        learner.remember(Label(at, (1.0, 0.1 * i), source))
     assert learner.knows(seen(0), 0.25)  # three times the same, and no human
     assert not learner.knows(TestDoubt.FAR, 0.25)
 
 
 class TestDoubt:
-    FAR = Features(np.zeros(BINS, np.float32), np.eye(32, dtype=np.float32))
+    FAR = Features(scan=np.zeros(BINS, np.float32), image=np.eye(32, dtype=np.float32))
 
     def proven(self):
         learner = taught(12)
@@ -143,7 +143,7 @@ class TestDoubt:
         assert not taught().doubts(self.FAR)
         assert not taught().frozen().doubts(self.FAR)
         learner = self.proven()
-        learner.remember(Label(seen(50).scan, seen(50).image, (1.0, 0.5), "human"))
+        learner.remember(Label(seen(50), (1.0, 0.5), "human"))
         assert not learner.doubts(self.FAR)
 
     def test_what_it_does_does_not_depend_on_being_watched(self):
@@ -154,7 +154,7 @@ class TestDoubt:
 class TestFile:
     def saved(self, tmp_path, network):
         path = tmp_path / "novice.safetensors"
-        about = Checkpoint(network.kind, BINS, FILTERS, "thesis-sim", None, "lira demo", 0, examples=network.examples)
+        about = Checkpoint.of(network, "thesis-sim", "lira demo", 0)
         save_checkpoint(path, network, about)
         return path
 
@@ -162,19 +162,19 @@ class TestFile:
         network = taught().frozen()
         back, about = load_checkpoint(self.saved(tmp_path, network))
         assert about.kind == "kernel"
-        assert back.act(seen(3).scan, seen(3).image) == network.act(seen(3).scan, seen(3).image)
+        assert back.act(seen(3)) == network.act(seen(3))
 
     @pytest.mark.parametrize("examples", [-1, 10**9])
     def test_a_number_of_examples_that_nobody_has_taught_is_refused(self, tmp_path, examples):
         path = tmp_path / "novice.safetensors"
-        about = Checkpoint("kernel", BINS, FILTERS, "thesis-sim", None, "lira demo", 0, examples=examples)
-        save_checkpoint(path, taught().frozen(), about)
+        network = taught().frozen()
+        save_checkpoint(path, network, replace(Checkpoint.of(network, "thesis-sim", "lira demo", 0), examples=examples))
         with pytest.raises(StorageError, match=r"does not hold what it says.*examples"):
             load_checkpoint(path)
 
     def test_one_that_was_taught_nothing_stands(self, tmp_path):
         back, _ = load_checkpoint(self.saved(tmp_path, novice().frozen()))
-        assert back.act(seen(3).scan, seen(3).image) == (0.0, 0.0)
+        assert back.act(seen(3)) == (0.0, 0.0)
 
     @pytest.mark.parametrize(
         "damage",

@@ -1,10 +1,12 @@
 import numpy as np
 import pytest
 import torch
+from nets import camera_net, lidar_net
 
 from lira.fusion.learning.labels import Label, is_rest, mirror
 from lira.fusion.learning.learner import Learner
-from lira.fusion.policies.networks import CameraNet, FusionNet, LidarNet
+from lira.fusion.policies.networks import FusionNet
+from lira.fusion.preprocess import Features
 
 
 @pytest.fixture(autouse=True)
@@ -20,25 +22,27 @@ def labels(count, seed=0):
     made = []
     for _ in range(count):
         scan, gray = rng.random(101, dtype=np.float32), rng.integers(0, 256, (32, 32))
-        made.append(Label(scan, (gray / 255).astype(np.float32), (float(rng.random()), float(scan[0])), "human"))
+        seen = Features(scan=scan, image=(gray / 255).astype(np.float32))
+        made.append(Label(seen, (float(rng.random()), float(scan[0])), "human"))
     return made
 
 
 def test_the_mirror_image_of_a_label_reverses_what_is_seen_and_the_turn():
     (label,) = labels(1)
     other = mirror(label)
-    assert (other.scan[0], other.scan[100]) == (label.scan[100], label.scan[0])
-    assert other.image[3, 0] == label.image[3, 31]
+    seen, mirrored = label.features, other.features
+    assert (mirrored.scan[0], mirrored.scan[100]) == (seen.scan[100], seen.scan[0])
+    assert mirrored.image[3, 0] == seen.image[3, 31]
     assert other.action == (label.action[0], -label.action[1])
     again = mirror(other)
-    np.testing.assert_array_equal(again.scan, label.scan)
-    np.testing.assert_array_equal(again.image, label.image)
+    for name, array in again.features.items():
+        np.testing.assert_array_equal(array, seen[name])
     assert again.action == label.action
 
 
 @pytest.mark.parametrize("frozen", [True, False])
 def test_learning_mirrored_is_learning_both_labels_in_their_order(frozen):
-    network = FusionNet.from_experts(CameraNet(16, seed=1), LidarNet(101, seed=2))
+    network = FusionNet.from_experts([camera_net(16, seed=1), lidar_net(101, seed=2)])
     mirrored = Learner(network, seed=0, frozen_trunks=frozen, mirrored=True)
     both = Learner(network, seed=0, frozen_trunks=frozen)
     for label in labels(20):
@@ -54,13 +58,13 @@ def test_learning_mirrored_is_learning_both_labels_in_their_order(frozen):
 @pytest.mark.parametrize("frozen", [True, False])
 def test_labels_beyond_the_memory_teach_the_same(frozen):
     """The trunks see them in batches instead of one by one, which may round differently."""
-    network = FusionNet.from_experts(CameraNet(16, seed=1), LidarNet(101, seed=2))
+    network = FusionNet.from_experts([camera_net(16, seed=1), lidar_net(101, seed=2)])
     near = Learner(network, seed=0, frozen_trunks=frozen)
     far = Learner(network, seed=0, frozen_trunks=frozen, resident_bytes=20 * (12_800 if frozen else 1_428))
     for label in labels(60):
         near.add(label)
         far.add(label)
-    assert far._inputs[0].count == 20
+    assert far._resident == 20
     assert far._spilled.count == 40
     assert far.train_step() == pytest.approx(near.train_step(), rel=0.02)
     if frozen:  # otherwise convolutions in half precision may round far apart

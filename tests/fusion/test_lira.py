@@ -14,7 +14,7 @@ from lira.hal.messages import ExpertView
 
 T = 0.20
 NOVICE = (0.9, -0.3)
-FEATURES = Features(np.zeros(101, np.float32), np.zeros((32, 32), np.float32))
+FEATURES = Features(scan=np.zeros(101, np.float32), image=np.zeros((32, 32), np.float32))
 
 
 def expert(name, action, *, active):
@@ -119,7 +119,7 @@ class FixedNetwork:
     def __init__(self, action=NOVICE):
         self.action = action
 
-    def act(self, scan, image):
+    def act(self, seen):
         return self.action
 
     def load_weights(self, weights):

@@ -19,7 +19,7 @@ from lira.hal.safety.governed import govern
 from lira.hal.testing import NullRobot
 
 PROFILE = load_profile("thesis-sim")
-SEEN = Features(np.ones(101, np.float32), np.ones((36, 36), np.float32))
+SEEN = Features(scan=np.ones(101, np.float32), image=np.ones((36, 36), np.float32))
 LAB = """
 import lira
 from lira.fusion.methods.presets import Preset

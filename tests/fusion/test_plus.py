@@ -2,18 +2,18 @@
 
 import numpy as np
 import pytest
+from nets import fusion_net
 
 from lira.fusion.learning.novice import LearningSettings, NetworkNovice
 from lira.fusion.log.recorder import Journal
 from lira.fusion.methods.base import Alone, Call, Chooser, Expert
 from lira.fusion.methods.lira import LiraSettings, LiraSpf
 from lira.fusion.methods.plus import LiraPlus, PlusSettings
-from lira.fusion.policies.networks import FusionNet
 from lira.fusion.preprocess import Features
 
 PERIOD_S = 0.2
 BINS = 101
-NETWORK = FusionNet(BINS, 16, seed=3)
+NETWORK = fusion_net(BINS, 16, seed=3)
 CRUISE, LEFT, RIGHT = (1.0, 0.0), (1.0, 0.8), (1.0, -0.8)
 BARE = PlusSettings(prefill=0, reserve_s=0.0, handover_s=0.0, sure=None)
 
@@ -22,7 +22,7 @@ def seen(brightness=0.5, nearness=1.0):
     rng = np.random.default_rng(int(1e3 * brightness + 1e6 * nearness))
     scan = np.full(BINS, nearness, np.float32) * rng.uniform(0.99, 1.0, BINS).astype(np.float32)
     image = np.full((32, 32), brightness, np.float32) * rng.uniform(0.99, 1.0, (32, 32)).astype(np.float32)
-    return Features(scan, image)
+    return Features(scan=scan, image=image)
 
 
 class Shelf:

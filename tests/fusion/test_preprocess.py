@@ -7,7 +7,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from lira.fusion.preprocess import Preprocessor, bin_scan, from_uint8, gray_image, to_uint8
+from lira.fusion.modalities.image import from_uint8, gray_image, to_uint8
+from lira.fusion.modalities.scan import bin_scan
+from lira.fusion.preprocess import Preprocessor
 from lira.hal.errors import SensorError
 from lira.hal.messages import CompressedImage, Image, LaserScan, Observation
 from lira.hal.profile import load_profile

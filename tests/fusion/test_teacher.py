@@ -17,7 +17,7 @@ from lira.sim_backend.world import Box, Limits, Line, Piece, World
 
 PROFILE = load_profile("thesis-sim")
 PERIOD_S = PROFILE.period_s
-FEATURES = Features(np.zeros(101, np.float32), np.zeros((32, 32), np.float32))
+FEATURES = Features(scan=np.zeros(101, np.float32), image=np.zeros((32, 32), np.float32))
 QUIET = Proposal(FEATURES, Choice("novice", (1.0, 0.0)))
 CALLED = Proposal(FEATURES, Choice("novice", (1.0, 0.0), call=Call.FEEDBACK))
 SURE = {"delay_sigma": 0.0, "gain_sigma": 0.0, "wrong_direction": 0.0, "missed": 0.0}

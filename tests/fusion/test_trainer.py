@@ -8,11 +8,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 import torch
+from nets import lidar_net
 from test_learner import labels
 
 from lira.fusion.learning.learner import Learner
 from lira.fusion.learning.trainer import InlineTrainer, ProcessTrainer
-from lira.fusion.policies.networks import LidarNet
 from lira.hal.errors import LiraError
 
 WAIT_S = 60.0  # for what is certain to come; only a hang takes that long
@@ -27,7 +27,7 @@ def _one_thread():
 
 
 def learner(updates: int = 50) -> Learner:
-    return Learner(LidarNet(101), seed=1, frozen_trunks=False, updates=updates)
+    return Learner(lidar_net(101), seed=1, frozen_trunks=False, updates=updates)
 
 
 def process_trainer(**settings):
@@ -127,7 +127,7 @@ def press():
 
 threading.Thread(target=press).start()
 try:
-    ProcessTrainer(Learner(LidarNet(8), seed=0, frozen_trunks=False)).close()
+    ProcessTrainer(Learner(lidar_net(8), seed=0, frozen_trunks=False)).close()
 finally:
     ready.set()
 """
@@ -172,7 +172,7 @@ import time
 from lira.fusion.learning.learner import Learner
 from lira.fusion.policies.networks import LidarNet
 from lira.fusion.learning.trainer import ProcessTrainer
-trainer = ProcessTrainer(Learner(LidarNet(101), seed=0, frozen_trunks=False))
+trainer = ProcessTrainer(Learner(lidar_net(101), seed=0, frozen_trunks=False))
 print(trainer.pid, flush=True)
 time.sleep(600)
 """

@@ -8,6 +8,10 @@ from lira.hal.errors import ConfigError
 from lira.hal.profile import NESTED, RobotProfile, known_profiles, load_profile
 
 
+def toml(value):
+    return repr(list(value) if isinstance(value, tuple) else value)
+
+
 def load_with(table, **changes):
     data = msgspec.to_builtins(msgspec.structs.replace(load_profile("rosbot2"), ranger=()))
     data = {key: value for key, value in data.items() if value}
@@ -18,7 +22,7 @@ def load_with(table, **changes):
             line
             for name, keys in data.items()
             if isinstance(keys, dict)
-            for line in [f"[{name}]", *(f"{k} = {v!r}" for k, v in keys.items() if v is not None)]
+            for line in [f"[{name}]", *(f"{k} = {toml(v)}" for k, v in keys.items() if v is not None)]
         ]
     )
     return parse_toml(text, RobotProfile, "mine.toml")

@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from lira.fusion.preprocess import bin_scan
+from lira.fusion.modalities.scan import bin_scan
 from lira.hal.messages import LaserScan
 from lira.hal.messages.ranges import read_ranges
 from lira.hal.profile import load_profile

@@ -6,7 +6,8 @@ import msgspec
 import numpy as np
 import pytest
 
-from lira.fusion.preprocess import bin_scan, gray_image, to_uint8
+from lira.fusion.modalities.image import gray_image, to_uint8
+from lira.fusion.modalities.scan import bin_scan
 from lira.hal.messages import Command, Twist
 from lira.hal.profile import load_profile
 from lira.sim_backend import drive

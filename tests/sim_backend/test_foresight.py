@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from lira.fusion.preprocess import gray_image
+from lira.fusion.modalities.image import gray_image
 from lira.hal.messages import Episode
 from lira.hal.profile import load_profile
 from lira.sim_backend.foresight import sketching

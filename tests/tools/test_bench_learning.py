@@ -5,7 +5,7 @@ import pytest
 from short_trials import write_world
 
 from lira.fusion.control import ControlLoop
-from lira.fusion.preprocess import gray_image
+from lira.fusion.modalities.image import gray_image
 from lira.hal.messages import CompressedImage
 from lira.tools.bench import log, preprocess, step, train
 

@@ -5,7 +5,7 @@ import pytest
 
 from lira.fusion.log.run_log import LapRecord, ResultRecord
 from lira.fusion.policies.checkpoint import Checkpoint, save_checkpoint
-from lira.fusion.policies.networks import CameraNet, LidarNet
+from lira.fusion.policies.networks import ExpertNet
 from lira.tools.experiments.studies import corridor, passage, table1
 from lira.tools.experiments.trial import Outcome
 from lira.tools.runs import expert_training as training
@@ -37,9 +37,10 @@ def test_table_3_holds_lira_against_hg_dagger():
 
 
 def test_table_1_reads_what_the_experts_took_from_their_files(tmp_path):
-    for kind, network, labels in (("camera", CameraNet(16), 200), ("lidar", LidarNet(101), 300)):
-        about = Checkpoint(kind, 101, 16, "thesis-sim", (1.0, 0.0), "", 0, labels=labels, training_steps=labels // 30)
-        save_checkpoint(tmp_path / f"{kind}.safetensors", network, about)
+    for network, labels in ((ExpertNet("image", (32, 32), 16), 200), (ExpertNet("scan", (101,)), 300)):
+        about = Checkpoint.of(network, "thesis-sim", "", 0, (1.0, 0.0))
+        about.labels, about.training_steps = labels, labels // 30
+        save_checkpoint(tmp_path / f"{network.kind}.safetensors", network, about)
     trials = [msgspec.structs.replace(trial, experts=str(tmp_path)) for trial in table1.trials(2)]
     outcomes = [outcome(trial, buffer=buffer) for trial, buffer in zip(trials, (40, 60, 400, 600), strict=True)]
     rows = {row["policy"]: row for row in table1.tables(outcomes)[0].rows}

@@ -15,7 +15,8 @@ import torch
 from lira.fusion.experts.files import shipped_path
 from lira.fusion.log.label_log import Demonstration, DemonstrationLog
 from lira.fusion.policies.checkpoint import Checkpoint, save_checkpoint
-from lira.fusion.policies.networks import LidarNet
+from lira.fusion.policies.networks import ExpertNet
+from lira.fusion.preprocess import Features, shapes_of
 from lira.hal.bus.bus import Bus
 from lira.hal.client import remote
 from lira.hal.profile import load_profile
@@ -69,11 +70,10 @@ def refused(capsys):
 
 
 def write_log(path, profile=PROFILE, count=3):
-    shape = profile.features
-    seen = np.zeros(shape.bins, np.float32), np.zeros((shape.image_px, shape.image_px), np.float32)
+    seen = Features(**{name: np.zeros(shape, np.float32) for name, shape in shapes_of(profile).items()})
     with DemonstrationLog(path, profile) as log:
         for seq in range(count):
-            log.append(Demonstration(0.2 * seq, seq, 1, "human", (1.0, 0.5), (0.0, 0.0), True, *seen))
+            log.append(Demonstration(0.2 * seq, seq, 1, "human", (1.0, 0.5), (0.0, 0.0), True, seen))
     return path
 
 
@@ -98,7 +98,8 @@ def test_a_missing_checkpoint_is_named(address, refused, tmp_path):
 
 def test_the_checkpoint_of_another_profile_is_refused(address, refused, tmp_path):
     path = tmp_path / "real.safetensors"
-    save_checkpoint(path, LidarNet(130), Checkpoint("lidar", 130, 32, "rosbot2", None, "lira", 0))
+    network = ExpertNet("scan", (130,))
+    save_checkpoint(path, network, Checkpoint.of(network, "rosbot2", "lira", 0))
     what, remedy = refused("fusion", *address, "--policy", path)
     assert "trained for 'rosbot2'" in what
     assert "the checkpoint of this profile" in remedy

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from lira.fusion.log.label_log import Demonstration, DemonstrationLog, read_demonstrations
+from lira.fusion.preprocess import Features
 from lira.hal.profile import load_profile
 from lira.tools.cli import main
 
@@ -12,8 +13,8 @@ SIM = load_profile("thesis-sim")
 
 def label(k: int) -> Demonstration:
     rng = np.random.default_rng(k)
-    scan, image = rng.random(101, np.float32), rng.random((32, 32), np.float32)
-    return Demonstration(0.2 * k, k, 0, "human", (0.5, 0.1), (0.0, 0.0), True, scan, image)
+    seen = Features(scan=rng.random(101, np.float32), image=rng.random((32, 32), np.float32))
+    return Demonstration(0.2 * k, k, 0, "human", (0.5, 0.1), (0.0, 0.0), True, seen)
 
 
 @pytest.fixture

@@ -13,7 +13,7 @@ from functools import partial
 import msgspec
 import numpy as np
 
-from lira.fusion.preprocess import gray_image
+from lira.fusion.modalities.image import gray_image
 from lira.hal.bus.attachment import Attachment, parse_attachment
 from lira.hal.bus.services import REALTIME, EstopState, Info, info_from_json, reset_time
 from lira.hal.errors import LiraError

@@ -14,7 +14,8 @@ import torch
 
 from lira.fusion.learning.learner import Label, Learner
 from lira.fusion.log.label_log import Demonstration, DemonstrationLog, read_demonstrations
-from lira.fusion.policies.networks import CameraNet, FusionNet, LidarNet
+from lira.fusion.policies.networks import FusionNet
+from lira.fusion.preprocess import Features, shapes_of
 from lira.hal.profile import load_profile
 from lira.tools.bench import Row
 
@@ -27,10 +28,7 @@ def run() -> list[Row]:
     """Return one row per thing done with the log; `rss_mb` is the resident size after it, `grown_mb` what it added."""
     torch.set_num_threads(1)
     profile = load_profile(PROFILE)
-    shape = profile.features
-    learner = Learner(
-        FusionNet.from_experts(CameraNet(shape.filters), LidarNet(shape.bins)), seed=0, frozen_trunks=True
-    )
+    learner = Learner(FusionNet(shapes_of(profile), profile.features.filters), seed=0, frozen_trunks=True)
     learner.add(next(random_labels(1)))
     learner.train_step()  # loads what is slow the first time
     rows: list[Row] = []
@@ -53,7 +51,7 @@ def run() -> list[Row]:
             note("open again", began)
         began = time.perf_counter()
         for record in read_demonstrations(path):
-            learner.add(Label(record.scan, record.image, record.action, record.source))
+            learner.add(Label(record.features, record.action, record.source))
         note("read and learn", began)
         began = time.perf_counter()
         learner.train_step()
@@ -64,25 +62,20 @@ def run() -> list[Row]:
 
 def random_labels(count: int) -> Iterator[Label]:
     """Noise: neither the time nor the memory depends on what is seen."""
-    shape, rng = load_profile(PROFILE).features, np.random.default_rng(0)
-    kinds = [
-        Label(
-            rng.random(shape.bins, dtype=np.float32),
-            (rng.integers(0, 256, (shape.image_px, shape.image_px)) / 255).astype(np.float32),
-            (1.0, float(rng.uniform(-1, 1))),
-            "human",
-        )
-        for _ in range(KINDS)
-    ]
+    shapes, rng = shapes_of(load_profile(PROFILE)), np.random.default_rng(0)
+
+    def noise() -> Features:
+        grays = {name: (rng.integers(0, 256, shape) / 255).astype(np.float32) for name, shape in shapes.items()}
+        return Features(**grays)
+
+    kinds = [Label(noise(), (1.0, float(rng.uniform(-1, 1))), "human") for _ in range(KINDS)]
     for k in range(count):
         yield kinds[k % KINDS]
 
 
 def as_demonstration(k: int, label: Label) -> Demonstration:
     """Give a label its place in a session."""
-    return Demonstration(
-        0.2 * k, k, 1 + k // 400, label.source, label.action, (0.0, 0.0), True, label.scan, label.image
-    )
+    return Demonstration(0.2 * k, k, 1 + k // 400, label.source, label.action, (0.0, 0.0), True, label.features)
 
 
 def resident_mb() -> float:

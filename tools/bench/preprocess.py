@@ -8,7 +8,8 @@ from collections.abc import Callable
 import cv2
 import numpy as np
 
-from lira.fusion.preprocess import bin_scan, gray_image
+from lira.fusion.modalities.image import gray_image
+from lira.fusion.modalities.scan import bin_scan
 from lira.hal.messages import CompressedImage, FloatArray, Image, LaserScan
 from lira.hal.profile import load_profile
 from lira.tools.bench import Row

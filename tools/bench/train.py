@@ -9,7 +9,8 @@ from torch import Tensor, nn
 
 from lira.fusion.learning.learner import Label, Learner
 from lira.fusion.learning.trainer import ProcessTrainer
-from lira.fusion.policies.networks import CameraNet, FusionNet, LidarNet
+from lira.fusion.policies.networks import ExpertNet, FusionNet, Network
+from lira.fusion.preprocess import Features, Shape
 from lira.tools.bench import Row
 
 RUNS = 5
@@ -59,14 +60,20 @@ def random_labels(bins: int) -> list[Label]:
 
     def label() -> Label:
         image = (rng.integers(0, 256, (32, 32)) / 255).astype(np.float32)
-        return Label(rng.random(bins, dtype=np.float32), image, (float(rng.random()), float(rng.random())), "human")
+        seen = Features(image=image, scan=rng.random(bins, dtype=np.float32))
+        return Label(seen, (float(rng.random()), float(rng.random())), "human")
 
     return [label() for _ in range(LABELS)]
 
 
+def shapes(filters: int) -> dict[str, Shape]:
+    """What a robot's networks see."""
+    return {"image": (32, 32), "scan": (BINS[filters],)}
+
+
 def make_learner(filters: int, trunks: str, labels: list[Label]) -> Learner:
     """Prepare a learner that knows the labels."""
-    network = FusionNet.from_experts(CameraNet(filters), LidarNet(BINS[filters]))
+    network = FusionNet(shapes(filters), filters)
     learner = Learner(network, batch=BATCH, updates=UPDATES, seed=0, frozen_trunks=trunks == "frozen")
     for label in labels:
         learner.add(label)
@@ -108,8 +115,8 @@ class PlainLearner:
     def __init__(self, filters: int, labels: list[Label]) -> None:
         self._network = PlainFusionNet(BINS[filters], filters)
         self._adam = torch.optim.Adam(self._network.parameters(), lr=1e-3)
-        self._scans = torch.from_numpy(np.stack([label.scan for label in labels]))
-        self._images = torch.from_numpy(np.stack([label.image for label in labels])[:, None])
+        self._scans = torch.from_numpy(np.stack([label.features.scan for label in labels]))
+        self._images = torch.from_numpy(np.stack([label.features.image for label in labels])[:, None])
         self._actions = torch.tensor([label.action for label in labels])
 
     def train_step(self) -> None:
@@ -125,7 +132,10 @@ class PlainLearner:
 
 def control_loop(learner: Learner, filters: int, labels: list[Label]) -> Row:
     """Decide at 20 Hz with all three networks while a process trains; a miss is a decision later than its period."""
-    policies = [CameraNet(filters), LidarNet(BINS[filters]), FusionNet(BINS[filters], filters)]
+    policies: list[Network] = [
+        *(ExpertNet(*seen, filters) for seen in shapes(filters).items()),
+        FusionNet(shapes(filters), filters),
+    ]
     trainer = ProcessTrainer(learner)
     took_s: list[float] = []
     steps = 0
@@ -140,7 +150,7 @@ def control_loop(learner: Learner, filters: int, labels: list[Label]) -> Row:
                 steps += 1
             label = labels[len(took_s) % len(labels)]
             for policy in policies:
-                policy.act(label.scan, label.image)
+                policy.act(label.features)
             trainer.add(label)
             if not trainer.pending and steps < TRAINING_STEPS:
                 trainer.start(next_s)

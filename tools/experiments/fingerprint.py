@@ -8,7 +8,7 @@ from pathlib import Path
 import msgspec
 
 import lira
-from lira.fusion.experts.files import SHIPPED, expert_path
+from lira.fusion.experts.files import expert_path, experts_of
 from lira.fusion.experts.tasks import TASKS, task_of
 from lira.hal.profile import load_profile
 from lira.sim_backend.catalogue import load_world
@@ -28,7 +28,7 @@ def fingerprint(world: str, pair: str, source: bytes = b"") -> str:
     profile = load_profile(TASKS[task_of(world)].profile)
     parts = sorted(filter(None, (code(path) for path in sources(START))))
     parts += [msgspec.json.encode(each) for each in (load_world(world), profile)]
-    parts += [expert_path(name, profile, pair).read_bytes() for name in SHIPPED]
+    parts += [expert_path(name, profile, pair).read_bytes() for name in experts_of(profile)]
     parts += [source] if source else []
     return hashlib.sha256(b"".join(hashlib.sha256(part).digest() for part in parts)).hexdigest()[:16]
 

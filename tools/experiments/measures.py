@@ -123,11 +123,11 @@ def experts_share(counts: dict[str, int]) -> int:
 @cache
 def expert_labels(task: str) -> dict[str, int]:
     """Labels that trained each expert of a task, from its file; an expert of an older version counts nothing."""
-    from lira.fusion.experts.files import SHIPPED
+    from lira.fusion.experts.files import experts_of
     from lira.fusion.experts.load import load_network
 
     profile = load_profile(TASKS[task].profile)
-    return {name: load_network(f"{name}-expert", profile, task)[1].labels or 0 for name in SHIPPED}
+    return {name: load_network(f"{name}-expert", profile, task)[1].labels or 0 for name in experts_of(profile)}
 
 
 def median(values: Sequence[float]) -> float:

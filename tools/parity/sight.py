@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from lira.fusion.preprocess import gray_image
+from lira.fusion.modalities.image import gray_image
 from lira.hal.messages import FloatArray, LaserScan
 from lira.hal.messages.ranges import read_ranges
 from lira.tools.parity.record import Recording

@@ -4,7 +4,7 @@ from collections.abc import Callable, Sequence
 
 import msgspec
 
-from lira.fusion.experts.files import SHIPPED
+from lira.fusion.experts.files import EXPERTS, experts_of
 from lira.fusion.experts.load import as_expert, load_network, load_policy
 from lira.fusion.experts.tasks import DEFAULT
 from lira.fusion.learning.kernel_novice import KernelNovice
@@ -15,7 +15,7 @@ from lira.fusion.methods.context import Context, Trunks
 from lira.fusion.methods.presets import Preset
 from lira.fusion.policies.ensemble import EnsembleNet
 from lira.fusion.policies.kernel_net import KernelNet
-from lira.fusion.policies.networks import CameraNet, FusionNet, LidarNet, Network
+from lira.fusion.policies.networks import ExpertNet, FusionNet, Network, seen_by
 from lira.fusion.teaching.session import Drive
 from lira.fusion.teaching.teacher import ScriptedTeacher, TeacherSettings
 from lira.hal.errors import ConfigError
@@ -52,16 +52,14 @@ def build_method(
             raise ConfigError(f"more than one driver would be called '{name}'", "Give the expert another name.")
 
     def new_novice(*, ensemble: int = 0, trunks: Trunks | None = None, m: int | None = None) -> Novice:
-        camera, lidar = seeing([network for network, _ in loaded])
+        sees = seeing([network for network, _ in loaded])
         learning = preset.learning if m is None else msgspec.structs.replace(preset.learning, labels_per_step=m)
         novice: Novice
         if preset.kernel is not None:
-            novice = KernelNovice(
-                KernelNet.from_experts(camera, lidar), learning, preset.kernel, mirrored=preset.mirrored
-            )
+            novice = KernelNovice(KernelNet.from_experts(sees), learning, preset.kernel, mirrored=preset.mirrored)
         else:
             frozen = (trunks or preset.trunks) == "frozen"
-            network = new_network(camera, lidar, seed, frozen=frozen)
+            network = new_network(sees, seed, frozen=frozen)
             if ensemble:
                 network = EnsembleNet(network, ensemble, seed)
             learner = Learner(network, seed=seed, frozen_trunks=frozen, mirrored=preset.mirrored)
@@ -72,24 +70,24 @@ def build_method(
     return (build or preset.build)(Context(profile, experts, seed, new_novice))
 
 
-def seeing(experts: Sequence[Network]) -> tuple[CameraNet, LidarNet]:
-    """Return the networks of a pair, whose trunks a novice may see with. Raises `ConfigError` for another pair."""
-    camera, lidar = experts
-    if not isinstance(camera, CameraNet) or not isinstance(lidar, LidarNet):
-        raise ConfigError("the experts are of the wrong kind", "Train them anew: lira train-expert camera|lidar")
-    return camera, lidar
+def seeing(experts: Sequence[Network]) -> list[ExpertNet]:
+    """Return the networks whose trunks a novice may see with. Raises `ConfigError` for those of another kind."""
+    seen = [expert for expert in experts if isinstance(expert, ExpertNet)]
+    if len(seen) < len(experts):
+        raise ConfigError(
+            "the experts are of the wrong kind", f"Train them anew: lira train-expert {'|'.join(EXPERTS)}"
+        )
+    return seen
 
 
-def new_network(camera: CameraNet, lidar: LidarNet, seed: int, *, frozen: bool) -> FusionNet:
-    """Make an untrained novice's network: with copies of the experts' trunks, or of their shape only."""
-    if frozen:
-        return FusionNet.from_experts(camera, lidar, seed=seed)
-    return FusionNet(lidar.trunk.bins, camera.trunk.filters, px=camera.trunk.px, seed=seed)
+def new_network(experts: Sequence[ExpertNet], seed: int, *, frozen: bool) -> FusionNet:
+    """Make an untrained novice's network: with copies of the experts' trunks, or of their shapes only."""
+    return FusionNet.from_experts(experts, seed=seed) if frozen else FusionNet(*seen_by(experts), seed=seed)
 
 
 def load_pair(profile: RobotProfile, pair: str = DEFAULT) -> list[tuple[Network, Expert]]:
-    """Load the camera and the lidar expert of a pair. Raises `ConfigError`."""
-    loaded = [(name, *load_network(f"{name}-expert", profile, pair)) for name in SHIPPED]
+    """Load the expert of each sensor that a robot learns from. Raises `ConfigError`."""
+    loaded = [(name, *load_network(f"{name}-expert", profile, pair)) for name in experts_of(profile)]
     return [(network, as_expert(name, network, file.cruise)) for name, network, file in loaded]
 
 

@@ -9,7 +9,7 @@ import numpy as np
 import torch
 
 from lira.fusion.control import ControlLoop
-from lira.fusion.experts.files import SHIPPED, Sensor, folder_of, seeded
+from lira.fusion.experts.files import experts_of, folder_of, seeded
 from lira.fusion.experts.tasks import DEFAULT, TASKS
 from lira.fusion.learning.learner import Learner
 from lira.fusion.learning.novice import LearningSettings, NetworkNovice
@@ -18,7 +18,8 @@ from lira.fusion.log.recorder import Journal
 from lira.fusion.methods.base import Alone
 from lira.fusion.methods.rivals.hg_dagger import HgDagger
 from lira.fusion.policies.checkpoint import Checkpoint, save_checkpoint
-from lira.fusion.policies.networks import CameraNet, LidarNet, Network
+from lira.fusion.policies.networks import ExpertNet, Network
+from lira.fusion.preprocess import modalities_of
 from lira.fusion.teaching.curriculum import Curriculum, curriculum
 from lira.fusion.teaching.session import Same, Session
 from lira.fusion.teaching.teacher import ScriptedTeacher
@@ -33,15 +34,14 @@ from lira.tools.runs.teach import telling
 BLIND_PX = 4
 
 
-def train_expert(kind: Sensor, task: str, profile: RobotProfile, seed: int, path: Path, command: str) -> bool:
-    """Train a task's camera or lidar expert and save it to `path` if it passes. Returns whether it did."""
+def train_expert(kind: str, task: str, profile: RobotProfile, seed: int, path: Path, command: str) -> bool:
+    """Train the expert that a task has for one sensor, and save it to `path` if it passes. Returns whether it did."""
     torch.set_num_threads(1)
     course = curriculum(kind, task)
     world = load_world(course.world)
     profile = blindfolded(profile) if kind == "lidar" else sketching(profile)
-    shape = profile.features
-    network: Network
-    network = CameraNet(shape.filters, seed=seed) if kind == "camera" else LidarNet(shape.bins, seed=seed)
+    sees = next(row for row in modalities_of(profile) if row.sensor == kind)
+    network = ExpertNet(sees.name, sees.shape(profile), profile.features.filters, seed=seed)
     novice = NetworkNovice(network, InlineTrainer(Learner(network, seed=seed, frozen_trunks=False)), LearningSettings())
     with (
         simulate(world, profile, seed=seed) as robot,
@@ -53,7 +53,7 @@ def train_expert(kind: Sensor, task: str, profile: RobotProfile, seed: int, path
         passed = session.teach(Same(course.drives), teacher, course.laps)
     if passed:
         cruise = measure_cruise(network, profile, course)
-        about = Checkpoint(kind, shape.bins, shape.filters, profile.name, cruise, command, seed)
+        about = Checkpoint.of(network, profile.name, command, seed, cruise)
         save_checkpoint(path, network, replace(about, labels=novice.stored, training_steps=novice.training_steps))
         print(f"{kind} expert: {novice.stored} labels, {novice.training_steps} training steps, saved to {path}")
     return passed
@@ -74,7 +74,7 @@ def provide(pair: str) -> None:
         return
     task, seed = found
     profile = load_profile(TASKS[task].profile)
-    for kind in SHIPPED:
+    for kind in experts_of(profile):
         path = folder_of(pair) / f"{kind}.safetensors"
         if not path.exists() and not train_expert(kind, task, profile, seed, path, command(kind, task, profile, seed)):
             raise LiraError(f"the {kind} expert of {pair} did not pass its curriculum", "Try another seed.")
@@ -94,7 +94,7 @@ def blindfolded(profile: RobotProfile) -> RobotProfile:
 
 def measure_cruise(network: Network, profile: RobotProfile, course: Curriculum) -> Action:
     """Median action where the world is straight and empty: what the expert does with nothing to react to."""
-    alone = Alone("novice", lambda features: network.act(features.scan, features.image))
+    alone = Alone("novice", network.act)
     with simulate(course.cruise_world, profile) as robot:
         loop = ControlLoop(robot)
         loop.arm()

@@ -34,7 +34,6 @@ def snapshot(
     """
     labels, steps, network = novice.stored, novice.training_steps, novice.frozen()
     doubtful = aside_words(novice.set_aside())
-    sizes = profile.features.bins, profile.features.filters
 
     def write() -> str:
         sync()
@@ -42,8 +41,8 @@ def snapshot(
             return f"saved {labels} labels in {folder}; there is no novice yet"
         if network is None:
             return f"saved {labels} labels in {folder}; this method's novice has no network to save"
-        about = Checkpoint(network.kind, *sizes, profile.name, None, head.command, head.seed)
-        about = replace(about, labels=labels, training_steps=steps, examples=network.examples)
+        about = Checkpoint.of(network, profile.name, head.command, head.seed)
+        about = replace(about, labels=labels, training_steps=steps)
         save_checkpoint(folder / NOVICE, network, about)
         return f"saved {labels} labels and the novice after {steps} training steps in {folder}{doubtful}"
 

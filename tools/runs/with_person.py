@@ -57,7 +57,7 @@ def learn_from_person(
             record.write(head)
             for old in read_demonstrations(log.path):
                 if old.stored:
-                    novice.remember(Label(old.scan, old.image, old.action, old.source, novice.weight(old.source)))
+                    novice.remember(Label(old.features, old.action, old.source, novice.weight(old.source)))
             journal, loop = Journal(keep=log.append, write=record.write, publish=publish), ControlLoop(robot)
             with stop_or_interrupt() as stop, request_line(robot, args) as line:
                 service = OperatorService(

@@ -69,7 +69,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Run the demo from start to report."""
-    from lira.fusion.experts.files import SHIPPED, expert_path
+    from lira.fusion.experts.files import expert_path, experts_of
     from lira.fusion.experts.tasks import TASKS, task_of
     from lira.fusion.methods.syllabus import THESIS, with_proof
     from lira.hal.profile import load_profile
@@ -82,7 +82,7 @@ def run(args: argparse.Namespace) -> int:
     task = task_of(load_world(world).name)
     robot = args.profile or TASKS[task].profile
     profile = load_profile(robot)
-    for expert in SHIPPED:
+    for expert in experts_of(profile):
         expert_path(expert, profile, task)
     for package, extra in {**NEEDED, **(NEEDED_BY_WIRE if args.wire else {})}.items():
         if find_spec(package) is None:

@@ -38,9 +38,9 @@ def run(args: argparse.Namespace) -> int:
     from lira.hal.profile import load_profile
     from lira.tools.runs.expert_training import command, train_expert
 
-    owner = TASKS[args.task].lidar
-    if args.expert == "lidar" and owner != args.task:
-        what = f"the task '{args.task}' has no lidar expert of its own: it uses that of '{owner}'"
+    owner = TASKS[args.task].owner(args.expert)
+    if owner != args.task:
+        what = f"the task '{args.task}' has no {args.expert} expert of its own: it uses that of '{owner}'"
         raise ConfigError(what, f"Train that one with --task {owner}.")
     profile = load_profile(args.profile or TASKS[args.task].profile)
     path = args.out or shipped_path(args.expert, profile, args.task)

@@ -60,4 +60,4 @@ class InterventionWeighted(HgDagger):
     def _remember(self, past: Proposal) -> None:
         """What the robot did there is redundant by definition, and yet to be learned: it is to stay so."""
         features = past.features
-        self.novice.remember(Label(features.scan, features.image, past.choice.action, OWN, self.novice.weight(OWN)))
+        self.novice.remember(Label(features, past.choice.action, OWN, self.novice.weight(OWN)))

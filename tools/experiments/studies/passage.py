@@ -5,7 +5,7 @@ from functools import cache, partial
 
 import numpy as np
 
-from lira.fusion.experts.files import SHIPPED, Sensor
+from lira.fusion.experts.files import experts_of
 from lira.fusion.experts.load import load_policy
 from lira.fusion.log.recorder import Journal
 from lira.fusion.log.run_log import LapRecord
@@ -30,7 +30,7 @@ def trials(seeds: int) -> list[Trial]:
 
 
 @cache
-def alone(name: Sensor, trial: Trial) -> tuple[LapRecord, Track]:
+def alone(name: str, trial: Trial) -> tuple[LapRecord, Track]:
     """Drive the passage with one expert and nobody to help, as far as it comes."""
     expert = load_policy(f"{name}-expert", trial.profile, trial.pair)
     notes, method = Notes(), Alone(name, expert.act)
@@ -86,7 +86,7 @@ def final(group: Sequence[Outcome]) -> Track | None:
 
 def drives(outcomes: Outcomes) -> list[Row]:
     """Each expert alone, and the first seed's final novices."""
-    shown = {f"{name} expert": alone(name, outcomes[0].trial) for name in SHIPPED}
+    shown = {f"{name} expert": alone(name, outcomes[0].trial) for name in experts_of(outcomes[0].trial.profile)}
     for method, group in by_method(outcomes).items():
         proofs = [each for each in group[0].laps if each.phase == "prove"]
         track = final(group)
@@ -141,7 +141,7 @@ def figures(outcomes: Outcomes) -> list[Picture]:
     from lira.tools.experiments import plots
 
     trial = outcomes[0].trial
-    tracks = {f"{name} expert alone": alone(name, trial)[1] for name in SHIPPED}
+    tracks = {f"{name} expert alone": alone(name, trial)[1] for name in experts_of(trial.profile)}
     for method, group in by_method(outcomes).items():
         tracks[f"training, {method}"] = group[0].tracks[0]
         proven = final(group)

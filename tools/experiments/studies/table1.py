@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from lira.fusion.experts.files import SHIPPED
+from lira.fusion.experts.files import experts_of
 from lira.fusion.experts.load import load_network
 from lira.fusion.methods.presets import METHODS
 from lira.tools.experiments.experiment import Experiment, Finding, Outcomes, Row, Table
@@ -29,7 +29,10 @@ def rows(outcomes: Outcomes) -> list[Row]:
     """One row per policy: medians over the seeds beside the thesis's."""
     groups = by_method(outcomes)
     trial = outcomes[0].trial
-    files = {name: load_network(f"{name}-expert", trial.profile, trial.pair)[1] for name in reversed(SHIPPED)}
+    files = {
+        name: load_network(f"{name}-expert", trial.profile, trial.pair)[1]
+        for name in reversed(experts_of(trial.profile))
+    }
     taken = {f"{name} expert": [(file.labels or 0, file.training_steps or 0)] for name, file in files.items()}
     for preset, group in groups.items():
         taken[f"novice, {preset}"] = [(each.result.buffer, each.result.training_steps) for each in group]
@@ -62,7 +65,7 @@ def tables(outcomes: Outcomes) -> list[Table]:
 def findings(outcomes: Outcomes) -> list[Finding]:
     """A novice takes far fewer labels than its experts did (30 against 480)."""
     ours = {str(each["policy"]): float(str(each["labels"])) for each in rows(outcomes)}
-    experts = sum(ours[f"{name} expert"] for name in SHIPPED)
+    experts = sum(ours[f"{name} expert"] for name in experts_of(outcomes[0].trial.profile))
     found = []
     for preset in by_method(outcomes):
         novice = ours[f"novice, {preset}"]

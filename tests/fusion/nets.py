@@ -1,0 +1,29 @@
+"""Networks of the sizes that the robots' profiles have, in few words, and something for them to see."""
+
+import numpy as np
+
+from lira.fusion.policies.networks import ExpertNet, FusionNet
+from lira.fusion.preprocess import Features
+
+
+def shapes(bins, px=32):
+    return {"image": (px, px), "scan": (bins,)}
+
+
+def camera_net(filters, *, px=32, seed=0):
+    return ExpertNet("image", (px, px), filters, seed=seed)
+
+
+def lidar_net(bins, *, seed=0):
+    return ExpertNet("scan", (bins,), seed=seed)
+
+
+def fusion_net(bins, filters, *, px=32, seed=0):
+    return FusionNet(shapes(bins, px), filters, seed=seed)
+
+
+def noise(bins, seed=0):
+    """What nobody has seen: every value of an image a multiple of 1/255."""
+    rng = np.random.default_rng(seed)
+    gray = (rng.integers(0, 256, (32, 32)) / 255).astype(np.float32)
+    return Features(image=gray, scan=rng.random(bins, dtype=np.float32))
