@@ -7,7 +7,7 @@ from lira.fusion.preprocess import Features
 from lira.hal.messages import Action
 
 if TYPE_CHECKING:
-    from lira.fusion.policies.networks import Network
+    from lira.fusion.inference.networks import DrivingNet
 
 
 class LearnedPolicy:
@@ -58,7 +58,7 @@ class LearnedPolicy:
         """Number and source of the labels it does not believe; none, unless it can tell."""
         return []
 
-    def frozen(self) -> "Network | None":
+    def frozen(self) -> "DrivingNet | None":
         """Return a copy of the policy as it drives alone, to be saved; None if it is no network."""
         return None
 

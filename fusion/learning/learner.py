@@ -9,12 +9,12 @@ import torch
 from numpy.typing import NDArray
 from torch import Tensor
 
+from lira.fusion.inference.architecture import Weights
 from lira.fusion.learning.label_store import FileRows, Rows
 from lira.fusion.learning.labels import Label as Label
 from lira.fusion.learning.labels import mirror
 from lira.fusion.policies.ensemble import EnsembleNet
 from lira.fusion.policies.networks import Inputs, Network, PictureTrunk, ScanTrunk, batch_of_one
-from lira.fusion.policies.networks import Weights as Weights
 from lira.fusion.preprocess import MODALITIES
 
 RESIDENT_BYTES = 128 * 2**20  # of inputs in memory; 10,000 labels with frozen trunks, 92,000 without

@@ -9,10 +9,10 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
+from lira.fusion.inference.ensemble import DrivingEnsemble
 from lira.fusion.learning.kernel_novice import KernelNovice
 from lira.fusion.learning.novice import NetworkNovice, Novice
 from lira.fusion.methods.base import STAND, Call, Choice, Method, Policy, Proposal
-from lira.fusion.policies.ensemble import EnsembleNet
 from lira.fusion.preprocess import Features
 from lira.hal.errors import ConfigError
 from lira.hal.messages import FloatArray
@@ -43,7 +43,7 @@ def doubt_of(novice: Novice) -> Doubt:
     if isinstance(novice, KernelNovice):
         return lambda features: math.hypot(*(each**2 for each in novice.deviation(features)))
     network = novice.network if isinstance(novice, NetworkNovice) else None
-    if not isinstance(network, EnsembleNet):
+    if not isinstance(network, DrivingEnsemble):
         raise ConfigError("this novice cannot doubt", "Give it an ensemble, or the kernel novice.")
     return lambda features: doubt(network.opinions(features))
 

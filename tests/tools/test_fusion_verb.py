@@ -13,8 +13,8 @@ import pytest
 import torch
 
 from lira.fusion.experts.files import shipped_path
+from lira.fusion.inference.checkpoint import Checkpoint, save_checkpoint
 from lira.fusion.log.label_log import Demonstration, DemonstrationLog
-from lira.fusion.policies.checkpoint import Checkpoint, save_checkpoint
 from lira.fusion.policies.networks import ExpertNet
 from lira.fusion.preprocess import Features, shapes_of
 from lira.hal.bus.bus import Bus

@@ -4,10 +4,10 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
 
+from lira.fusion.inference.checkpoint import Checkpoint, save_checkpoint
 from lira.fusion.learning.learned_policy import LearnedPolicy
 from lira.fusion.log.run_log import RunRecord
 from lira.fusion.operator_service import Job
-from lira.fusion.policies.checkpoint import Checkpoint, save_checkpoint
 from lira.hal.errors import ConfigError
 from lira.hal.profile import RobotProfile
 
