@@ -172,9 +172,15 @@ def to_joints(tiles: Tiles) -> list[Mark]:
     ]
 
 
-def cube(x_m: float, y_m: float, yaw_rad: float, size_m: float, gray: int) -> Block:
-    """Make a cube of a scatter."""
-    return Block(x_m, y_m, yaw_rad, size_m, size_m, size_m, gray)
+def standing(along: Along, *at: float) -> Block:
+    """Make a box of a scatter at (x, y, yaw)."""
+    return Block(*at, along.size_m, along.size_m, along.height_m or along.size_m, along.gray)
+
+
+def table_top(along: Along, *at: float) -> Block:
+    """Make a table top of a scatter at (x, y, yaw)."""
+    bottom_m, thickness_m = along.tops_m
+    return Block(*at, along.size_m, along.size_m, thickness_m, along.tops_gray, bottom_m)
 
 
 def scatter_along(
@@ -198,17 +204,16 @@ def scatter_along(
         off_m = rng.choice([-1.0, 1.0]) * rng.uniform(near_m, far_m)
         on_m = rng.uniform(-1.0, 1.0) * along.on_lateral_m
         places.append(curve.pose(at_m, float(off_m if number in beside else on_m)))
-    # Drawn last, so that fakes leave the places as they are.
-    fakes = set(rng.permutation(along.count)[: round(along.count * along.fake)].tolist())
-    size_m, height_m = along.size_m, along.height_m or along.size_m
-    real = [Block(*at, size_m, size_m, height_m, along.gray) for k, at in enumerate(places) if k not in fakes]
+    # Drawn last, so that fakes and tops leave the places as they are.
+    drawn = rng.permutation(along.count).tolist()
+    fakes = set(drawn[: round(along.count * along.fake)])
+    tops = set(drawn[len(drawn) - round(along.count * along.tops) :])
+    real = [(table_top if k in tops else standing)(along, *at) for k, at in enumerate(places) if k not in fakes]
     fake = [Mark(*at, *along.fake_m, along.gray) for k, at in enumerate(places) if k in fakes]
     return real, fake
 
 
-def scatter_area(
-    area: Area, standing: list[Block], start: tuple[float, float], rng: np.random.Generator
-) -> list[Block]:
+def scatter_area(area: Area, others: list[Block], start: tuple[float, float], rng: np.random.Generator) -> list[Block]:
     """Throw boxes until `count` stand free of each other, denser towards the far end."""
     blocks: list[Block] = []
     for _ in range(area.count):
@@ -220,8 +225,9 @@ def scatter_area(
             clear_of_start = math.hypot(x - start[0], y - start[1]) > CLEAR_OF_START_M + half_m
             # A circle around the new box is enough: the gap is a minimum.
             reach_m = half_m * math.sqrt(2.0) + area.gap_m
-            if clear_of_start and all(distance_m(other, x, y) > reach_m for other in standing + blocks):
-                blocks.append(cube(x, y, rng.uniform(-math.pi, math.pi), area.size_m, area.gray))
+            if clear_of_start and all(distance_m(other, x, y) > reach_m for other in others + blocks):
+                yaw_rad, height_m = rng.uniform(-math.pi, math.pi), area.height_m or area.size_m
+                blocks.append(Block(x, y, yaw_rad, area.size_m, area.size_m, height_m, area.gray, area.bottom_m))
                 break
         else:
             raise ConfigError(

@@ -138,7 +138,8 @@ class Along(Table, frozen=True):
     A share `on` of them stands on the line, up to `on_lateral_m` off its middle; the rest beside it, with the centre
     `beside_m` = [nearest, farthest] to either side. `clear_m` of line stay free at the start (and before a closed
     line's end, which is the same place). They are cubes of `size_m` unless `height_m` says otherwise. A share `fake`
-    is only painted on the floor, `fake_m` = [length, width].
+    is only painted on the floor, `fake_m` = [length, width]. A share `tops` are table tops: slabs of `tops_gray` with
+    free room below them, `tops_m` = [height of the lower side, thickness].
     """
 
     count: Few
@@ -152,18 +153,24 @@ class Along(Table, frozen=True):
     gray: Gray = 0
     fake: Share = 0.0
     fake_m: tuple[Size, Size] = (0.45, 0.45)
+    tops: Share = 0.0
+    tops_m: tuple[Size, Size] = (0.27, 0.02)
+    tops_gray: Gray = 0
 
     def __post_init__(self) -> None:
-        """Refuse an empty lateral range."""
+        """Refuse an empty lateral range, and more kinds than there are boxes."""
+        if self.fake + self.tops > 1.0:
+            raise ValueError(f"fake = {self.fake:g} and tops = {self.tops:g} are more than all")
         if self.beside_m[0] > self.beside_m[1]:
             raise ValueError(f"beside_m = {list(self.beside_m)} must be [nearest, farthest]")
 
 
 class Area(Table, frozen=True):
-    """Cubes scattered over a rectangle, with at least `gap_m` of free floor between any two boxes.
+    """Boxes scattered over a rectangle, with at least `gap_m` of free floor between any two.
 
     `x_m` and `y_m` are [from, to]. From the near end to the far end in x the density grows from `sparse` times
-    the mean up to its mirror (1: even, 0: empty at the near end).
+    the mean up to its mirror (1: even, 0: empty at the near end). They are cubes of `size_m` unless `height_m` says
+    otherwise, and have `bottom_m` of free room below them.
     """
 
     count: Few
@@ -172,6 +179,8 @@ class Area(Table, frozen=True):
     gap_m: Gap = 0.8
     sparse: Share = 1.0
     size_m: Size = 0.45
+    height_m: Size | None = None
+    bottom_m: Gap = 0.0
     gray: Gray = 0
 
     def __post_init__(self) -> None:

@@ -29,6 +29,7 @@ TASKS = {
         Task("passage", "thesis-sim", ("passage", "passage-train")),
         Task("garden", "rosbot2", ("garden", "garden-train")),
         Task("corridor", "rosbot2", ("corridor", "corridor-train"), {"lidar": "garden"}),
+        Task("table-top", "thesis-sim-depth", ("table-top", "table-top-train"), {"camera": DEFAULT, "lidar": DEFAULT}),
     )
 }
 

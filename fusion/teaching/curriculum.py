@@ -1,7 +1,7 @@
 """What each task's two experts are trained on: the world, the drives, and how strict the teacher is."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import msgspec
 
@@ -101,12 +101,18 @@ def _edge(world: str, askew: Sequence[tuple[float, float]], starts: Sequence[flo
     return Curriculum(world, teacher, (*recoveries, Drive(Episode(0), 240.0)), laps=12, cruise_world=world)
 
 
+def _table_top_depth() -> Curriculum:
+    """As the lidar expert of the line: straight on until something is in the way, be it a box or a table top."""
+    return replace(_line_lidar(), world="table-top-train")
+
+
 CURRICULA = {
     DEFAULT: {"camera": _line_camera(STRICT), "lidar": _line_lidar()},
     "eight": {"camera": _line_camera(SKILLED)},  # Appendix C is about an expert taught as a person does: bang-bang
     "passage": {"camera": _passage(), "lidar": _passage()},
     "garden": {"camera": _garden_camera(), "lidar": _garden_lidar()},
     "corridor": {"camera": _corridor_camera()},
+    "table-top": {"depth": _table_top_depth()},
 }
 
 

@@ -1,7 +1,6 @@
 """When each rival hands control over and back, and what it learns; against numbers worked out by hand."""
 
 import math
-from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -14,6 +13,7 @@ from lira.fusion.methods.rivals.intervention_weighted import OWN, InterventionWe
 from lira.fusion.methods.rivals.lazy_dagger import LazyDagger, LazyDaggerSettings
 from lira.fusion.methods.rivals.probe import START, Probe
 from lira.fusion.methods.rivals.thrifty_dagger import ThriftyDagger, ThriftyDaggerSettings
+from lira.fusion.preprocess import Features
 
 NOVICE = (0.9, -0.3)
 FAR = (1.0, 1.0)
@@ -194,7 +194,7 @@ def test_thrifty_daggers_thresholds_follow_from_its_budget():
 
 def test_a_probe_says_nothing_until_it_has_seen_enough_and_then_tells_rare_places_apart():
     probe = Probe(seed=0)
-    near = replace(FEATURES, scan=np.full(101, 0.1, np.float32))
+    near = Features(scan=np.full(101, 0.1, np.float32), image=FEATURES.image)
     for _ in range(START - 1):
         probe.add(FEATURES, NOVICE, 0.0)
     probe.fit()

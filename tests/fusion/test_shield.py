@@ -121,8 +121,8 @@ def test_what_it_lets_through_comes_near_nothing_and_what_it_changes_would_have(
     assert turned > 5
 
 
-BOX, FREE = (Features(scan, IMAGE) for scan in (scan_of(SIM, (0.9, 0.1, 0.15)), scan_of(SIM)))
-WALL = Features(scan_of(SIM, *((0.5, 0.1 * k, 0.1) for k in range(-20, 21))), IMAGE)
+BOX, FREE = (Features(scan=scan, image=IMAGE) for scan in (scan_of(SIM, (0.9, 0.1, 0.15)), scan_of(SIM)))
+WALL = Features(scan=scan_of(SIM, *((0.5, 0.1 * k, 0.1) for k in range(-20, 21))), image=IMAGE)
 
 
 class TestShielded:

@@ -1,10 +1,9 @@
-from dataclasses import replace
-
 import numpy as np
 from taught import FEATURES
 
 from lira.fusion.methods.base import Call, Expert
 from lira.fusion.methods.rivals.switching import Switching, SwitchingSettings
+from lira.fusion.preprocess import Features
 
 CAMERA, LIDAR = (1.0, 0.1), (0.5, -0.8)
 
@@ -12,7 +11,7 @@ CAMERA, LIDAR = (1.0, 0.1), (0.5, -0.8)
 def seeing(nearest_m):
     scan = np.ones(101, np.float32)
     scan[40] = nearest_m / 4.0
-    return replace(FEATURES, scan=scan)
+    return Features(scan=scan, image=FEATURES.image)
 
 
 def drivers(rule, *nearest_m):

@@ -115,7 +115,7 @@ def test_the_process_gives_way_and_is_deaf_to_ctrl_c(real_time):
 CTRL_C = """
 import os, signal, threading
 from lira.fusion.learning.learner import Learner
-from lira.fusion.policies.networks import LidarNet
+from lira.fusion.policies.networks import ExpertNet
 from lira.fusion.learning.trainer import ProcessTrainer
 
 signal.signal(signal.SIGINT, lambda *_: None)
@@ -127,7 +127,7 @@ def press():
 
 threading.Thread(target=press).start()
 try:
-    ProcessTrainer(Learner(lidar_net(8), seed=0, frozen_trunks=False)).close()
+    ProcessTrainer(Learner(ExpertNet("scan", (8,)), seed=0, frozen_trunks=False)).close()
 finally:
     ready.set()
 """
@@ -170,9 +170,9 @@ def test_closing_in_the_middle_of_a_long_training_step_is_bounded():
 OWNER = """
 import time
 from lira.fusion.learning.learner import Learner
-from lira.fusion.policies.networks import LidarNet
+from lira.fusion.policies.networks import ExpertNet
 from lira.fusion.learning.trainer import ProcessTrainer
-trainer = ProcessTrainer(Learner(lidar_net(101), seed=0, frozen_trunks=False))
+trainer = ProcessTrainer(Learner(ExpertNet("scan", (101,)), seed=0, frozen_trunks=False))
 print(trainer.pid, flush=True)
 time.sleep(600)
 """

@@ -25,7 +25,9 @@ from lira.tools.options import natural
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the verb's arguments."""
-    parser.add_argument("expert", choices=["camera", "lidar"], help="which sensor it sees")
+    from lira.fusion.experts.files import EXPERTS
+
+    parser.add_argument("expert", choices=EXPERTS, help="which sensor it sees")
     parser.add_argument("--task", choices=TASKS, default=DEFAULT, help="what it is for (default: %(default)s)")
     parser.add_argument("--profile", help="robot profile (default: the task's)")
     parser.add_argument("--seed", type=natural, default=0, help="seed of everything random (default: %(default)s)")

@@ -59,5 +59,4 @@ class InterventionWeighted(HgDagger):
 
     def _remember(self, past: Proposal) -> None:
         """What the robot did there is redundant by definition, and yet to be learned: it is to stay so."""
-        features = past.features
-        self.novice.remember(Label(features, past.choice.action, OWN, self.novice.weight(OWN)))
+        self.novice.remember(Label(past.features, past.choice.action, OWN, self.novice.weight(OWN)))

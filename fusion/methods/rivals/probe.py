@@ -67,5 +67,6 @@ def _network(size: int, seed: int) -> nn.Sequential:
 
 
 def _inputs(features: Features, action: Action) -> Tensor:
-    picture = adaptive_avg_pool2d(torch.from_numpy(features.image)[None, None], PX).flatten()
-    return torch.cat([torch.from_numpy(features.scan), picture, torch.tensor(action, dtype=torch.float32)])
+    arrays = [torch.from_numpy(array) for array in sorted(features.values(), key=np.ndim)]
+    parts = [array if array.ndim == 1 else adaptive_avg_pool2d(array[None, None], PX).flatten() for array in arrays]
+    return torch.cat([*parts, torch.tensor(action, dtype=torch.float32)])
