@@ -115,7 +115,9 @@ def test_full_training_stays_close_to_plain_float32(monkeypatch):
     networks = fusion_net(*SIZES), fusion_net(*SIZES)
     for network, weights in zip(networks, (fast, exact), strict=True):
         network.load_weights(weights)
-    apart = [np.subtract(networks[0].driving().act(one.features), networks[1].driving().act(one.features)) for one in fresh]
+    apart = [
+        np.subtract(networks[0].driving().act(one.features), networks[1].driving().act(one.features)) for one in fresh
+    ]
     assert np.abs(apart).mean() < 0.05
 
 
