@@ -15,8 +15,8 @@ from lira.fusion.inference.checkpoint import Checkpoint, load_checkpoint
 from lira.fusion.inference.kernel_net import KernelNet
 from lira.fusion.inference.networks import DrivingNet
 from lira.fusion.methods.base import Alone, Expert, Method, Policy
-from lira.fusion.methods.doubt import Doubtful
 from lira.fusion.methods.shield import Shield, Shielded
+from lira.fusion.methods.stop_and_ask import Doubtful
 from lira.fusion.preprocess import Features, Shape, shapes_of
 from lira.hal.errors import ConfigError, PluginError
 from lira.hal.messages import Action

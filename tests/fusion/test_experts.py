@@ -7,8 +7,8 @@ from lira.fusion.experts.load import as_expert, load_alone, load_network, load_p
 from lira.fusion.experts.tasks import DEFAULT, TASKS, task_of
 from lira.fusion.inference.checkpoint import Checkpoint, save_checkpoint
 from lira.fusion.methods.base import Alone
-from lira.fusion.methods.doubt import Doubtful
 from lira.fusion.methods.shield import Shielded
+from lira.fusion.methods.stop_and_ask import Doubtful
 from lira.fusion.policies.networks import ExpertNet
 from lira.fusion.preprocess import Features
 from lira.hal.errors import ConfigError, StorageError

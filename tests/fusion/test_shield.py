@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from lira.fusion.methods.base import STAND, Alone, Call, Method
-from lira.fusion.methods.doubt import Doubtful
 from lira.fusion.methods.shield import DRIVER, HORIZON_S, MARGINS_M, STEPS, Shield, Shielded, arcs
+from lira.fusion.methods.stop_and_ask import Doubtful
 from lira.fusion.preprocess import Features
 from lira.hal.profile import load_profile
 

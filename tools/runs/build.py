@@ -18,17 +18,13 @@ from lira.fusion.methods.context import Context, Trunks
 from lira.fusion.methods.presets import Preset
 from lira.fusion.policies.ensemble import EnsembleNet
 from lira.fusion.policies.networks import FusionNet
-from lira.fusion.teaching.session import Drive
 from lira.fusion.teaching.teacher import ScriptedTeacher, TeacherSettings
 from lira.hal.errors import ConfigError
-from lira.hal.messages import Episode
 from lira.hal.profile import RobotProfile
 from lira.sim_backend.foresight import Foresight
-from lira.sim_backend.layout import build as build_layout
 from lira.sim_backend.world import World
 from lira.tools.runs.warm_start import warm_up
 
-PATIENCE = 4.0  # a lap may take so many times as long as at full speed
 NewTrainer = Callable[[Learner], Trainer]
 
 
@@ -90,10 +86,3 @@ def load_pair(profile: RobotProfile, pair: str = DEFAULT) -> list[tuple[DrivingN
 def teacher(skill: TeacherSettings, profile: RobotProfile, world: World, layout: int, seed: int) -> ScriptedTeacher:
     """Build a scripted teacher that can look ahead in a twin of its own."""
     return ScriptedTeacher(Foresight(profile, world, layout), profile, skill, seed)
-
-
-def lap(profile: RobotProfile, world: World, layout: int) -> Drive:
-    """One lap of a world, with time enough for slow parts."""
-    curve = build_layout(world, layout).curve
-    length_m = world.limits.finish_m or curve.length_m * world.limits.laps
-    return Drive(Episode(layout), limit_s=PATIENCE * length_m / profile.base.max_linear_m_s)

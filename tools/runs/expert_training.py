@@ -29,8 +29,8 @@ from lira.hal.messages import Action
 from lira.hal.profile import RobotProfile, load_profile
 from lira.sim_backend.catalogue import load_world
 from lira.sim_backend.foresight import Foresight, sketching
+from lira.tools.runs.progress import telling
 from lira.tools.runs.simulated import simulate
-from lira.tools.runs.teach import telling
 
 BLIND_PX = 4
 

@@ -12,7 +12,6 @@ from lira.hal.errors import ConfigError
 from lira.hal.profile import RobotProfile
 
 LABELS, RECORD, NOVICE = "labels.lira", "run.jsonl", "novice.safetensors"
-FLOOR = "floor"  # the world of a robot that is in none of ours
 
 
 def check_fresh(folder: Path) -> None:

@@ -1,15 +1,10 @@
 """The learner: reads the robot's sensors, decides five times a second, drives, and learns from whoever helps.
 
-It drives whatever robot has that name on the bus: the twin, or the real one. With --policy it only drives; on a twin,
-with --unseen, through so many layouts, and says how each went. With --method it learns: from a person with a gamepad,
+It drives whatever robot has that name on the bus: the twin, or the real one. It learns from a person with a gamepad,
 or, on a twin, from a scripted teacher until the novice is proven (--proof). What it learns goes into the --run folder:
-labels.lira (every label), novice.safetensors, run.jsonl.
+labels.lira (every label), novice.safetensors (for `lira drive`), run.jsonl.
 
 examples:
-  lira fusion --policy camera-expert                   let one expert drive
-  lira fusion --policy runs/demo-1/novice.safetensors  let a trained novice drive
-  lira fusion --policy runs/demo-1/novice.safetensors --layout 100 --unseen 3   through layouts 101 to 103 of a twin
-  lira fusion --policy runs/demo-1/novice.safetensors --ask    which stops and calls where it does not know
   lira fusion --method plus --run runs/mine            learn from a person
   lira fusion --method lira --teacher scripted --run runs/taught
   lira fusion --method lira --experts corridor         in a real corridor
@@ -20,57 +15,26 @@ examples:
 import argparse
 import shlex
 import sys
-from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from lira.fusion.experts.tasks import TASKS
 from lira.hal.errors import ConfigError
 from lira.tools.launch.lifetime import CLOSE_S
-from lira.tools.options import add_protocol, natural
+from lira.tools.options import add_protocol, add_robot, add_shield, natural
 
 if TYPE_CHECKING:
     from lira.hal.client.remote import RemoteRobot
-    from lira.hal.messages import Decision
     from lira.tools.runs.teach import Plan
-
-ENDPOINT = "127.0.0.1:7447"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
     add = parser.add_argument
-    add("--name", default="rosbot", help="the robot's name on the bus (default: %(default)s)")
-    add("--connect", default=ENDPOINT, metavar="HOST:PORT", help="where the robot listens (default: %(default)s)")
+    add_robot(parser)
+    add_shield(parser, "what drives unseen layouts")
     add(
-        "--arena",
-        metavar="HOST:PORT",
-        help="scripted teacher of a robot on a twin's devices: where that twin tells the truth (its --arena)",
-    )
-    what = parser.add_mutually_exclusive_group(required=True)
-    what.add_argument(
-        "--policy",
-        help="drive only: camera-expert, lidar-expert, a .safetensors file, or your own MODULE:OBJECT",
-    )
-    add(
-        "--ask",
-        action="store_true",
-        help="with --policy: a novice of plus stands and calls where it knows less than in the runs that proved it",
-    )
-    add(
-        "--shield",
-        action="store_true",
-        help="what drives alone (--policy, --unseen): a turn that would touch what the lidar sees gives way to the "
-        "nearest one that does not",
-    )
-    add(
-        "--experts",
-        metavar="PAIR",
-        help=f"whose experts: a task ({', '.join(TASKS)}), TASK@SEED, or a folder with camera.safetensors and "
-        "lidar.safetensors (default: those of a twin's world; line)",
-    )
-    what.add_argument(
         "--method",
+        required=True,
         help="learn by this method: plus, hold (LIRA-SPF), thesis, hg-dagger, ..., or your own MODULE:OBJECT; "
         "an unknown name lists them all",
     )
@@ -114,46 +78,33 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Drive until done or told to stop. Exit status 1 if the novice or the policy did not drive alone as it should."""
+    """Learn until done or told to stop. Exit status 1 if the novice did not drive alone as it should."""
     import torch
 
+    from lira.fusion.inference.threads import one_thread
     from lira.hal.client.remote import connect
 
-    plan = None if args.method is None else plan_of(args)
-    if plan is None and args.expert:
-        raise ConfigError("--expert goes with --method", "A policy of your own drives with --policy.")
-    if plan is not None and not plan.preset.approach.learns and args.teacher == "none":
+    plan = plan_of(args)
+    if not plan.preset.approach.learns and args.teacher == "none":
         raise ConfigError(f"by the method '{args.method}' nobody learns", "Show it on a twin with --teacher perfect.")
-    if args.ask and args.policy is None:
-        raise ConfigError("--ask is for a policy that drives", "Give one with --policy, or leave --ask out.")
-    torch.set_num_threads(1)  # the nets are small; and a result should not depend on the number of cores
+    torch.set_num_threads(1)
+    one_thread()
     with connect(args.connect, args.name, close_s=CLOSE_S) as robot:
-        if plan is None:
-            return show(args, robot)
         if args.teacher == "none":
             return learn_by_hand(args, plan, robot)
         from lira.tools.runs.on_twin import teach
+        from lira.tools.runs.reach import decisions_of, say
 
-        return teach(args, plan, robot, publisher(robot), say)
-
-
-def show(args: argparse.Namespace, robot: "RemoteRobot") -> int:
-    """Let a policy drive: through unseen layouts of a twin if it is asked to, else until it is told to stop."""
-    if args.unseen:
-        from lira.tools.runs.on_twin import examine
-
-        return examine(args, robot, publisher(robot), say)
-    from lira.tools.runs.with_person import show_policy
-
-    return show_policy(args, robot, publisher(robot), say)
+        return teach(args, plan, robot, decisions_of(robot), say)
 
 
 def learn_by_hand(args: argparse.Namespace, plan: "Plan", robot: "RemoteRobot") -> int:
     """Learn from whoever takes control."""
     from lira.fusion.learning.trainer import ProcessTrainer
+    from lira.tools.runs.reach import decisions_of, say
     from lira.tools.runs.with_person import learn_from_person
 
-    return learn_from_person(args, plan, robot, ProcessTrainer, publisher(robot), say)
+    return learn_from_person(args, plan, robot, ProcessTrainer, decisions_of(robot), say)
 
 
 def plan_of(args: argparse.Namespace) -> "Plan":
@@ -186,16 +137,3 @@ def plan_of(args: argparse.Namespace) -> "Plan":
         shield=args.shield,
         command=args.as_command or shlex.join(["lira", *sys.argv[1:]]),
     )
-
-
-def publisher(robot: "RemoteRobot") -> Callable[["Decision"], None]:
-    """Return what puts decisions on the bus."""
-    from lira.hal.bus.topics import DECISION
-
-    topic = robot.bus.publisher(DECISION)
-    return lambda decision: topic.put(decision, robot.now())
-
-
-def say(line: str) -> None:
-    """Print a line at once."""
-    print(line, flush=True)
