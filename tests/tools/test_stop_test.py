@@ -453,7 +453,7 @@ CI = (
     "hand's bridge killed (kill -9)",
     "second commander",
     "lidar freezes",
-    "lira fusion frozen (SIGSTOP)",
+    "lira drive frozen (SIGSTOP)",
     "disk full under labels and record",
     "link's process frozen (SIGSTOP)",
     "robot's process frozen (SIGSTOP)",
