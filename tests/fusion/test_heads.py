@@ -1,5 +1,7 @@
 """Gradients written out, held to those that PyTorch finds."""
 
+from itertools import pairwise
+
 import pytest
 import torch
 
@@ -10,7 +12,7 @@ N = 7
 
 def made(heads, sizes, seed=0):
     random = torch.Generator().manual_seed(seed)
-    pairs = list(zip(sizes, sizes[1:], strict=False))
+    pairs = list(pairwise(sizes))
     weights = [torch.randn(heads, before, after, generator=random) * 0.4 for before, after in pairs]
     return weights, [torch.randn(heads, 1, after, generator=random) for _, after in pairs], random
 
