@@ -4,6 +4,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 SEEDS := 10
 WORKERS := 2
+TEST_WORKERS := 6
 EXPERTS := $(foreach task,line eight passage garden corridor,camera:--task:$(task)) \
   $(foreach task,line passage garden,lidar:--task:$(task))
 BENCHES := twin lockstep latency train preprocess step log drivers takeover
@@ -27,12 +28,13 @@ $(VENV)/.installed: pyproject.toml constraints.txt
 demo: setup ## teach a robot in the twin, from start to report
 	$(BIN)/lira demo
 
-test: setup ## every test: the quick ones side by side, then those that need the machine for themselves
-	$(BIN)/python -m pytest -m "not processes" --numprocesses 2 --dist worksteal
-	$(BIN)/python -m pytest -m processes
+# Most tests wait for processes, so more run beside each other than there are processors.
+test: setup ## every test: most beside each other, then those that need the machine for themselves
+	$(BIN)/python -m pytest --crowd --numprocesses $(TEST_WORKERS) --dist worksteal
+	$(BIN)/python -m pytest --alone
 
 test-fast: setup ## the unit tests, in under a minute
-	$(BIN)/python -m pytest -m unit --numprocesses 2 --dist worksteal
+	$(BIN)/python -m pytest -m unit
 
 check: setup ## ruff, mypy (strict), who may import whom
 	$(BIN)/ruff check .
@@ -54,7 +56,7 @@ bench: setup ## all benchmarks, into runs/bench/; fails where a ratio in bench/h
 	  $(BIN)/lira bench $$name --json runs/bench/$$name.json --history bench/history || failed=1; \
 	done; exit $$failed
 
-results: setup ## every experiment of the thesis, then RESULTS.md; goes on where it was stopped
+results: setup ## every experiment, then RESULTS.md and docs/results; goes on where it was stopped
 	$(BIN)/lira experiment all --seeds $(SEEDS) --workers $(WORKERS)
 
 # Each expert's header holds the command that made it.

@@ -105,8 +105,8 @@ class Modality:
         return array if self.trunk == "scan" else to_uint8(array)
 
     def restore(self, kept: NDArray[Any]) -> FloatArray:
-        """Inverse of `keep`, exactly."""
-        return kept.astype(np.float32, copy=False) if self.trunk == "scan" else from_uint8(kept)
+        """Inverse of `keep`, exactly, in memory of its own."""
+        return kept.astype(np.float32) if self.trunk == "scan" else from_uint8(kept)
 
 
 def _scan(scan: LaserScan, profile: RobotProfile) -> tuple[FloatArray, int]:

@@ -11,17 +11,12 @@ from lira.fusion.control import ControlLoop
 from lira.fusion.log.recorder import Journal
 from lira.fusion.methods.base import Method
 from lira.fusion.operator_service import OperatorService
-from lira.hal.messages import Reason
+from lira.hal.messages import STOP, Applied, Reason
 
-REARM = "press and release the dead-man (the console's space bar is one), or start lira fusion again"
-STOPPED = {
-    Reason.NO_COMMAND: "no command reaches it; look whether it still runs",
-    Reason.STALE: f"its commands came too late; {REARM}",
-    Reason.NEUTRAL_FIRST: f"it waits for a neutral command; {REARM}",
-    Reason.REFUSED: f"it refused a command; {REARM}",
-    Reason.OBSTACLE: "something is in the way, or the lidar does not say",
-    Reason.ESTOP: f"the emergency stop is pressed; release it, then {REARM}",
-}
+
+def reason_alone(applied: Applied) -> str:
+    """Why the robot stands, in the governor's own word."""
+    return applied.reason
 
 
 def serve(
@@ -34,10 +29,11 @@ def serve(
     *,
     operator_service: OperatorService | None = None,
     layout: int = 0,
+    explain: Callable[[Applied], str] = reason_alone,
 ) -> None:
     """Run the control loop until `stop` is set; `operator_service` answers what a person asks between two steps.
 
-    `say` gets a line whenever what holds the robot changes.
+    `say` gets a line whenever what holds the robot changes; `explain` puts into words why it stands and what to do.
     """
     said: Reason | None = Reason.OK
     while not stop.is_set():
@@ -45,7 +41,8 @@ def serve(
             # Nothing of what was before belongs to what comes.
             method.reset()
             journal.ledger.new_episode()
-            say(f"the robot was started anew; what was learned goes on. It stands: {REARM}")
+            stands = Applied(STOP, 0.0, reason=Reason.NEUTRAL_FIRST)
+            say(f"the robot was started anew; what was learned goes on. {explain(stands)}")
         if operator_service is not None:
             operator_service.serve()
             if operator_service.paused:
@@ -54,8 +51,10 @@ def serve(
         step = loop.step(method)
         reason = None if step is None else step.applied.reason
         if reason is not said:
-            why = loop.trouble if reason is None else STOPPED.get(reason)
-            say("driving" if why is None else f"standing still: {why}")
+            if step is None:
+                say(f"standing still: {loop.trouble}")
+            else:
+                say("driving" if reason is Reason.OK else explain(step.applied))
             said = reason
         if step is not None:
             episode = 0 if operator_service is None else operator_service.episode

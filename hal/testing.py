@@ -53,6 +53,7 @@ class NullRobot:
         self._lock = threading.Lock()  # motion is asked for by whoever drives and whoever reads
         camera, depth = profile.camera, profile.depth
         self._ranges = np.full(profile.lidar.beams, np.inf, np.float32)
+        self._increment_rad = profile.lidar.increment_rad
         self._pixels = np.full((camera.height_px, camera.width_px, 3), GRAY, np.uint8)
         self._depths = np.zeros((0, 0) if depth is None else (depth.height_px, depth.width_px), np.uint16)
 
@@ -110,7 +111,7 @@ class NullRobot:
 
     def _scan(self, lidar: Lidar) -> LaserScan:
         limits = lidar.range_min_m, lidar.range_max_m
-        return LaserScan(self._last(lidar.rate_hz), -lidar.fov_rad / 2, lidar.increment_rad, *limits, self._ranges)
+        return LaserScan(self._last(lidar.rate_hz), -lidar.fov_rad / 2, self._increment_rad, *limits, self._ranges)
 
     def close(self) -> None:
         """Stop."""

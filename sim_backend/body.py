@@ -141,8 +141,8 @@ class Body:
 
     def _judge(self, clearance_m: float, touched: bool) -> None:
         course, was = self.course, self.verdict
-        place = course.place(self.motion.xy, self.motion.yaw_rad, was.progress_m)
-        progress_m, lateral_m = float(place.progress_m), float(place.lateral_m)
+        curve = course.layout.curve
+        progress_m, lateral_m = curve.project_one(float(self.motion.x_m), float(self.motion.y_m), was.progress_m)
         self.verdict = Verdict(
             began_m=was.began_m,
             progress_m=progress_m,

@@ -16,6 +16,7 @@ from lira.sim_backend.polyline import Floats
 FIRMWARE_PERIOD_S = 0.01
 FIRMWARE_WATCHDOG_S = 1.0
 WHEEL_LIMIT_M_S = 1.0
+TINY_RAD = 1e-20
 
 
 @dataclass(frozen=True, slots=True)
@@ -68,7 +69,7 @@ def ramp_wheels(
 def glide(now: Motion, linear_m_s: Floats, angular_rad_s: Floats, duration_s: float) -> Motion:
     """Follow an arc of constant velocity, exactly."""
     half_turn = angular_rad_s * duration_s / 2
-    chord = linear_m_s * duration_s * np.sinc(half_turn / math.pi)
+    chord = linear_m_s * duration_s * chord_of_arc(half_turn)
     return Motion(
         now.x_m + chord * np.cos(now.yaw_rad + half_turn),
         now.y_m + chord * np.sin(now.yaw_rad + half_turn),
@@ -76,6 +77,13 @@ def glide(now: Motion, linear_m_s: Floats, angular_rad_s: Floats, duration_s: fl
         linear_m_s,
         angular_rad_s,
     )
+
+
+def chord_of_arc(half_turn_rad: Floats) -> Floats:
+    """How long the chord is of an arc of length 1: sin(x) / x of half its angle, 1 where it is straight."""
+    angle = np.where(half_turn_rad == 0.0, TINY_RAD, half_turn_rad)
+    share: Floats = np.sin(angle) / angle
+    return share
 
 
 def effective_track_m(base: Base) -> float:
@@ -89,6 +97,6 @@ def reckon(base: Base, odometry: Motion, before: Motion, after: Motion, duration
     turn = after.yaw_rad - before.yaw_rad
     ahead = before.yaw_rad + turn / 2
     chord = (after.x_m - before.x_m) * np.cos(ahead) + (after.y_m - before.y_m) * np.sin(ahead)
-    linear = chord / np.sinc(turn / math.tau) / duration_s
+    linear = chord / chord_of_arc(turn / 2) / duration_s
     there = glide(odometry, linear, turn * skid / duration_s, duration_s)
     return replace(there, linear_m_s=after.linear_m_s, angular_rad_s=after.angular_rad_s * skid)

@@ -14,7 +14,7 @@ from lira.sim_backend.course import Course, Place, footprint_radius_m
 from lira.sim_backend.drive import Motion
 from lira.sim_backend.layout import build
 from lira.sim_backend.polyline import Floats
-from lira.sim_backend.sensors import Renderer
+from lira.sim_backend.scenes.opening import Renderer
 from lira.sim_backend.twin import Twin
 from lira.sim_backend.world import World
 
@@ -48,11 +48,11 @@ class Foresight:
     """
 
     def __init__(
-        self, profile: RobotProfile, world: str | World, layout: int = 0, *, renderer: Renderer = "auto"
+        self, profile: RobotProfile, world: str | World, layout: int = 0, *, renderer: Renderer = "sketch"
     ) -> None:
         self._profile = profile
         self._world = load_world(world) if isinstance(world, str) else world
-        self._twin = Twin(sketching(profile), self._world, layout=layout, renderer=renderer)
+        self._twin = Twin(with_small_camera(profile), self._world, layout=layout, renderer=renderer)
         self.set_layout(layout)
 
     def set_layout(self, layout: int) -> None:
@@ -111,13 +111,13 @@ class Foresight:
         self._twin.close()
 
 
-def sketching(profile: RobotProfile) -> RobotProfile:
+def with_small_camera(profile: RobotProfile) -> RobotProfile:
     """Return the profile with a camera that draws no more than the networks see, without noise: it is only imagined."""
     camera, px = profile.camera, profile.features.image_px
     if camera.width_px * camera.height_px <= px * px:
         return profile
-    sketch = msgspec.structs.replace(camera, width_px=px, height_px=px, encoding="png", noise_gray=0.0)
-    return msgspec.structs.replace(profile, camera=sketch)
+    small = msgspec.structs.replace(camera, width_px=px, height_px=px, encoding="png", noise_gray=0.0)
+    return msgspec.structs.replace(profile, camera=small)
 
 
 def spread(state: CourseState, count: int) -> Motion:

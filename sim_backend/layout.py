@@ -172,12 +172,12 @@ def to_joints(tiles: Tiles) -> list[Mark]:
     ]
 
 
-def standing(along: Along, *at: float) -> Block:
+def standing(along: Along, at: tuple[float, float, float]) -> Block:
     """Make a box of a scatter at (x, y, yaw)."""
     return Block(*at, along.size_m, along.size_m, along.height_m or along.size_m, along.gray)
 
 
-def table_top(along: Along, *at: float) -> Block:
+def table_top(along: Along, at: tuple[float, float, float]) -> Block:
     """Make a table top of a scatter at (x, y, yaw)."""
     bottom_m, thickness_m = along.tops_m
     return Block(*at, along.size_m, along.size_m, thickness_m, along.tops_gray, bottom_m)
@@ -208,7 +208,7 @@ def scatter_along(
     drawn = rng.permutation(along.count).tolist()
     fakes = set(drawn[: round(along.count * along.fake)])
     tops = set(drawn[len(drawn) - round(along.count * along.tops) :])
-    real = [(table_top if k in tops else standing)(along, *at) for k, at in enumerate(places) if k not in fakes]
+    real = [(table_top if k in tops else standing)(along, at) for k, at in enumerate(places) if k not in fakes]
     fake = [Mark(*at, *along.fake_m, along.gray) for k, at in enumerate(places) if k in fakes]
     return real, fake
 

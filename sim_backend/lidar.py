@@ -7,7 +7,7 @@ import numpy as np
 from lira.hal.messages import FloatArray, LaserScan
 from lira.hal.profile import Lidar
 from lira.sim_backend.polyline import Floats
-from lira.sim_backend.scene import Scene
+from lira.sim_backend.scenes.base import Pose, Scene
 
 
 def beam_angles(lidar: Lidar) -> Floats:
@@ -24,25 +24,10 @@ class RayLidar:
         self._rng = rng
         self._angles = beam_angles(lidar)
 
-    def request(self, x_m: float, y_m: float, yaw_rad: float) -> dict[str, object]:
-        """Return the arguments of pybullet's `rayTestBatch` from a robot at this pose."""
-        lidar = self._lidar
-        origin = [x_m + lidar.x_m * math.cos(yaw_rad), y_m + lidar.x_m * math.sin(yaw_rad), lidar.z_m]
-        ends = np.empty((lidar.beams, 3))
-        ends[:, 0] = origin[0] + lidar.range_max_m * np.cos(self._angles + yaw_rad)
-        ends[:, 1] = origin[1] + lidar.range_max_m * np.sin(self._angles + yaw_rad)
-        ends[:, 2] = lidar.z_m
-        return {
-            "rayFromPositions": [origin] * lidar.beams,
-            "rayToPositions": ends.tolist(),
-            "physicsClientId": self._scene.client,
-        }
-
-    def scan(self, x_m: float, y_m: float, yaw_rad: float, stamp_s: float) -> LaserScan:
+    def scan(self, pose: Pose, stamp_s: float) -> LaserScan:
         """One turn, captured at an instant. Ranges after REP-117: +inf no return, -inf too close, nan dropped out."""
         lidar = self._lidar
-        hits = self._scene.bullet.rayTestBatch(**self.request(x_m, y_m, yaw_rad))
-        ranges = np.array([hit[2] if hit[0] >= 0 else math.inf for hit in hits]) * lidar.range_max_m
+        ranges = self._scene.ranges_m(*self.fan(pose))
         return LaserScan(
             stamp_s=stamp_s,
             angle_min=float(self._angles[0]),
@@ -52,6 +37,12 @@ class RayLidar:
             ranges=self._spoil(ranges),
             scan_time=1.0 / lidar.rate_hz,
         )
+
+    def fan(self, pose: Pose) -> tuple[tuple[float, float, float], Floats, float]:
+        """Return the rays from a robot at this pose: where they begin, their angles [beams], how far they reach."""
+        lidar, (x_m, y_m, yaw_rad) = self._lidar, pose
+        origin = (x_m + lidar.x_m * math.cos(yaw_rad), y_m + lidar.x_m * math.sin(yaw_rad), lidar.z_m)
+        return origin, self._angles + yaw_rad, lidar.range_max_m
 
     def _spoil(self, ranges: Floats) -> FloatArray:
         """Add the noise of a real device, then say what it cannot measure."""

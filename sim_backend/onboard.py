@@ -13,8 +13,8 @@ from lira.sim_backend.polyline import Floats
 
 CONE_RAYS = 5  # of a ranger
 
-Cast = Callable[[Floats, Floats], Floats]
-"""Rays [n, 3] from and to: the share of each that is free, 1 where it meets nothing."""
+Look = Callable[[tuple[float, float, float], Floats, float], Floats]
+"""From a point along level rays of some angles [n], so far: where each meets something, +inf where nothing."""
 
 
 class Accelerometer:
@@ -42,27 +42,17 @@ class Accelerometer:
         )
 
 
-def read_ranger(ranger: Ranger, cast: Cast, motion: Motion, now_s: float) -> Range:
+def read_ranger(ranger: Ranger, look: Look, motion: Motion, now_s: float) -> Range:
     """Measure with a ranger from the robot's pose: the nearest of a few rays. REP-117."""
-    free = float(cast(*_cone(ranger, motion)).min())
-    range_m = free * ranger.range_max_m
-    if free >= 1.0:
-        range_m = math.inf
-    elif range_m < ranger.range_min_m:
-        range_m = -math.inf
-    return Range(now_s, ranger.frame_id, range_m, ranger.range_min_m, ranger.range_max_m)
-
-
-def _cone(ranger: Ranger, motion: Motion) -> tuple[Floats, Floats]:
-    """Rays of one ranger: from, to, both [rays, 3]."""
     yaw_rad = float(motion.yaw_rad)
     cos, sin = math.cos(yaw_rad), math.sin(yaw_rad)
     x_m = float(motion.x_m) + cos * ranger.x_m - sin * ranger.y_m
     y_m = float(motion.y_m) + sin * ranger.x_m + cos * ranger.y_m
-    start = np.tile([x_m, y_m, ranger.z_m], (CONE_RAYS, 1))
     angles = yaw_rad + ranger.yaw_rad + ranger.fov_rad * np.linspace(-0.5, 0.5, CONE_RAYS)
-    reach = ranger.range_max_m * np.stack([np.cos(angles), np.sin(angles), np.zeros(CONE_RAYS)], axis=1)
-    return start, start + reach
+    range_m = float(look((x_m, y_m, ranger.z_m), angles, ranger.range_max_m).min())
+    if range_m < ranger.range_min_m:
+        range_m = -math.inf
+    return Range(now_s, ranger.frame_id, range_m, ranger.range_min_m, ranger.range_max_m)
 
 
 def read_battery(battery: Battery, now_s: float) -> BatteryState:

@@ -1,7 +1,7 @@
 """A curve on the floor, sampled at equal arc length, and where points are relative to it. Pure numpy."""
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,8 +11,8 @@ Indices = NDArray[np.int64]
 
 STEP_M = 0.1
 FAR_M = 1e6
-# A hint is the progress a moment ago. This is how far it may be off.
-WINDOW_M = 1.2
+# A hint is the progress a moment ago. This is by how many steps it may be off.
+WINDOW = 13
 
 
 @dataclass(frozen=True, slots=True)
@@ -26,6 +26,11 @@ class Polyline:
     headings: Floats
     step_m: float
     closed: bool
+    _tables: "Tables" = field(init=False, repr=False, compare=False)
+
+    def __post_init__(self) -> None:
+        """Work out once what every projection looks up."""
+        object.__setattr__(self, "_tables", Tables.of(self.points, self.headings, self.closed))
 
     @property
     def segments(self) -> int:
@@ -62,44 +67,101 @@ class Polyline:
         With `hint_m` [...], or one for all, only the curve around that progress is looked at: where a figure-eight
         crosses itself the branch being driven is kept, and progress goes on growing over the laps of a closed curve.
         """
-        x, y = xy[..., 0], xy[..., 1]
+        x, y, tables = xy[..., 0], xy[..., 1], self._tables
         vertex = self._nearest_vertex(x, y, hint_m)
         first = vertex % self.segments if self.closed else vertex
-        heading = self.headings[first]
         # The nearest place is on the stretch before or after the nearest vertex.
-        behind = (x - self.points[first, 0]) * np.cos(heading) + (y - self.points[first, 1]) * np.sin(heading) < 0.0
+        behind = (x - tables.x[first]) * tables.cos[first] + (y - tables.y[first]) * tables.sin[first] < 0.0
         begin = vertex - behind
         if not self.closed:
-            begin = np.clip(begin, 0, self.segments - 1)
+            begin = np.minimum(np.maximum(begin, 0), self.segments - 1)
         first = begin % self.segments
-        chord_x, chord_y = (self.points[first + 1] - self.points[first]).T
-        off_x, off_y = x - self.points[first, 0], y - self.points[first, 1]
-        t = (off_x * chord_x + off_y * chord_y) / (chord_x * chord_x + chord_y * chord_y)
-        inside = np.clip(t, 0.0, 1.0)
+        chord_x, chord_y = tables.chord_x[first], tables.chord_y[first]
+        off_x, off_y = x - tables.x[first], y - tables.y[first]
+        t = (off_x * chord_x + off_y * chord_y) / tables.chord_squared[first]
+        on_curve = np.minimum(np.maximum(t, 0.0), 1.0)
+        inside = on_curve
         if not self.closed:
             beyond = ((begin == 0) & (t < 0.0)) | ((begin == self.segments - 1) & (t > 1.0))
             inside = np.where(beyond, t, inside)
         distance = np.hypot(off_x - inside * chord_x, off_y - inside * chord_y)
-        heading = self.headings[first] + np.clip(inside, 0.0, 1.0) * (self.headings[first + 1] - self.headings[first])
-        lateral = np.copysign(distance, chord_x * off_y - chord_y * off_x)
-        return (begin + inside) * self.step_m, lateral, heading
+        heading = self.headings[first] + on_curve * tables.turn[first]
+        lateral: Floats = np.asarray(np.copysign(distance, chord_x * off_y - chord_y * off_x))
+        return np.asarray((begin + inside) * self.step_m), lateral, np.asarray(heading)
+
+    def project_one(self, x: float, y: float, hint_m: float) -> tuple[float, float]:
+        """Progress and lateral of one place near `hint_m`: the same to the bit as `project`, and sooner."""
+        tables, segments = self._tables, self.segments
+        middle = round(hint_m / self.step_m)
+        place = middle % segments if self.closed else min(max(middle, -WINDOW), segments + WINDOW)
+        around = slice(place + WINDOW, place + 3 * WINDOW + 1)
+        gap_x, gap_y = tables.around_x[around] - x, tables.around_y[around] - y
+        vertex = (middle if self.closed else place) + int((gap_x * gap_x + gap_y * gap_y).argmin()) - WINDOW
+        first = vertex % segments if self.closed else min(max(vertex, 0), segments)
+        begin = vertex if self.closed else first
+        if (x - tables.x[first]) * tables.cos[first] + (y - tables.y[first]) * tables.sin[first] < 0.0:
+            begin -= 1
+        if not self.closed:
+            begin = min(max(begin, 0), segments - 1)
+        first = begin % segments
+        chord_x, chord_y = float(tables.chord_x[first]), float(tables.chord_y[first])
+        off_x, off_y = x - float(tables.x[first]), y - float(tables.y[first])
+        t = (off_x * chord_x + off_y * chord_y) / float(tables.chord_squared[first])
+        before, behind = t < 0.0, t > 1.0
+        if self.closed or not ((before and begin == 0) or (behind and begin == segments - 1)):
+            t = min(max(t, 0.0), 1.0)
+        distance = float(np.hypot(off_x - t * chord_x, off_y - t * chord_y))
+        return (begin + t) * self.step_m, math.copysign(distance, chord_x * off_y - chord_y * off_x)
 
     def _nearest_vertex(self, x: Floats, y: Floats, hint_m: Floats | float | None) -> Indices:
         """Index of the nearest vertex [...]; on a closed curve it counts on over the laps."""
+        tables, segments = self._tables, self.segments
         if hint_m is None:
-            near = np.arange(self.segments + (not self.closed))
-        else:
-            reach = math.ceil(WINDOW_M / self.step_m)
-            middle = np.rint(np.asarray(hint_m) / self.step_m).astype(np.int64)
-            near = middle[..., None] + np.arange(-reach, reach + 1)
-            if not self.closed:
-                near = np.clip(near, 0, self.segments)
-        wrapped = near % self.segments if self.closed else near
-        gap_x, gap_y = self.points[wrapped, 0] - x[..., None], self.points[wrapped, 1] - y[..., None]
-        best = (gap_x * gap_x + gap_y * gap_y).argmin(-1)
-        near = np.broadcast_to(near, gap_x.shape)
-        vertex: Indices = np.take_along_axis(near, best[..., None], -1)[..., 0]
-        return vertex
+            count = segments + (not self.closed)
+            gap_x, gap_y = tables.x[:count] - x[..., None], tables.y[:count] - y[..., None]
+            everywhere: Indices = (gap_x * gap_x + gap_y * gap_y).argmin(-1)
+            return everywhere
+        middle = np.rint(np.asarray(hint_m) / self.step_m).astype(np.int64)
+        place = middle % segments if self.closed else np.minimum(np.maximum(middle, -WINDOW), segments + WINDOW)
+        around = place[..., None] + np.arange(WINDOW, 3 * WINDOW + 1)
+        gap_x, gap_y = tables.around_x[around] - x[..., None], tables.around_y[around] - y[..., None]
+        nearest = (gap_x * gap_x + gap_y * gap_y).argmin(-1) - WINDOW
+        found: Indices = middle + nearest if self.closed else np.minimum(np.maximum(place + nearest, 0), segments)
+        return found
+
+
+@dataclass(frozen=True, slots=True)
+class Tables:
+    """What projecting onto a curve looks up: by vertex, by stretch, and around each vertex.
+
+    `around_x` and `around_y` begin two windows before the first vertex and end as far behind the last: round a closed
+    curve, and standing still at the ends of an open one.
+    """
+
+    x: Floats
+    y: Floats
+    cos: Floats
+    sin: Floats
+    chord_x: Floats
+    chord_y: Floats
+    chord_squared: Floats
+    turn: Floats
+    around_x: Floats
+    around_y: Floats
+
+    @staticmethod
+    def of(points: Floats, headings: Floats, closed: bool) -> "Tables":
+        """Work them out."""
+        x, y = np.ascontiguousarray(points.T)
+        chord_x, chord_y = np.diff(x), np.diff(y)
+        segments = len(points) - 1
+        around = np.arange(-2 * WINDOW, segments + 2 * WINDOW + 1)
+        around = around % segments if closed else np.clip(around, 0, segments)
+        return Tables(
+            *(x, y, np.cos(headings), np.sin(headings)),
+            *(chord_x, chord_y, chord_x * chord_x + chord_y * chord_y, np.diff(headings)),
+            *(x[around], y[around]),
+        )
 
 
 def resample(points: Floats, closed: bool) -> Polyline:

@@ -1,32 +1,28 @@
 """What the twin's robot senses of its scene, each sensor captured anew only when its period has passed."""
 
-import time
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
-from typing import Any, Literal
+from typing import Any
 
 import cv2
 import numpy as np
 
 from lira.hal.bus.sensors import SENSORS, Stamped
 from lira.hal.bus.topics import BATTERY
-from lira.hal.errors import ConfigError
 from lira.hal.messages import CompressedImage, DepthImage, Image
 from lira.hal.messages.compression import fit_jpeg
-from lira.hal.profile import Camera, RobotProfile
-from lira.sim_backend.camera import SMALL_PX, PinholeCamera, add_noise
+from lira.hal.profile import RobotProfile
+from lira.sim_backend.camera import PinholeCamera, add_noise
 from lira.sim_backend.drive import Motion
 from lira.sim_backend.layout import Layout
 from lira.sim_backend.lidar import RayLidar
 from lira.sim_backend.onboard import Accelerometer, read_battery, read_ranger
-from lira.sim_backend.scene import Scene, quiet
+from lira.sim_backend.scenes.base import Pose
+from lira.sim_backend.scenes.opening import Renderer, open_scene
 
 ROUNDING_S = 1e-9
-TRIAL_FRAMES = 3
 LASTING = {sensor.name for sensor in SENSORS if sensor.lasting}
-
-Renderer = Literal["auto", "tiny", "egl"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,9 +42,9 @@ class Sensors:
     def __init__(self, profile: RobotProfile, layout: Layout, renderer: Renderer, seed: int) -> None:
         self._profile = profile
         self._camera_rng, lidar_rng, imu_rng = (np.random.default_rng([seed, stream]) for stream in (1, 2, 3))
-        self._camera = open_camera(profile.camera, layout, renderer)
-        self._scene = self._camera.scene
-        self.renderer = "egl" if self._scene.egl else "tiny"
+        self._scene = open_scene(profile.camera, layout, renderer)
+        self._camera = PinholeCamera(profile.camera, self._scene)
+        self.drawer = self._scene.drawer
         self._devices = self._build(profile, lidar_rng, imu_rng)
         self._newest: dict[str, Stamped] = {}
 
@@ -59,18 +55,18 @@ class Sensors:
         lidar, depth, battery = RayLidar(profile.lidar, self._scene, lidar_rng), profile.depth, profile.battery
         devices = {
             "camera": Device(profile.camera.rate_hz, self._photograph),
-            "scan": Device(profile.lidar.rate_hz, lambda motion, now_s: lidar.scan(*_pose(motion), now_s)),
+            "scan": Device(profile.lidar.rate_hz, lambda motion, now_s: lidar.scan(_pose(motion), now_s)),
         }
         if depth is not None:
             devices["depth"] = Device(
-                depth.rate_hz, lambda motion, now_s: DepthImage(now_s, self._camera.depth(depth, *_pose(motion)))
+                depth.rate_hz, lambda motion, now_s: DepthImage(now_s, self._camera.depth(depth, _pose(motion)))
             )
         if profile.imu is not None:
             devices["imu"] = Device(profile.imu.rate_hz, Accelerometer(profile.imu, imu_rng).read)
         if battery is not None:
             devices["battery"] = Device(BATTERY.rate_hz, lambda _, now_s: read_battery(battery, now_s))
         for ranger in profile.ranger:
-            devices[ranger.frame_id] = Device(ranger.rate_hz, partial(read_ranger, ranger, self._scene.cast))
+            devices[ranger.frame_id] = Device(ranger.rate_hz, partial(read_ranger, ranger, self._scene.ranges_m))
         return devices
 
     def forget(self) -> None:
@@ -97,47 +93,16 @@ class Sensors:
     def _photograph(self, motion: Motion, now_s: float) -> Image | CompressedImage:
         """A picture, encoded as the profile wants it to travel."""
         camera = self._profile.camera
-        picture = add_noise(self._camera.render(*_pose(motion)), camera.noise_gray, self._camera_rng)
+        picture = add_noise(self._camera.render(_pose(motion)), camera.noise_gray, self._camera_rng)
+        colours = np.asarray(cv2.cvtColor(picture, cv2.COLOR_GRAY2BGR), dtype=np.uint8)
         if camera.encoding == "jpeg":
-            return CompressedImage(now_s, fit_jpeg(cv2.cvtColor(picture, cv2.COLOR_GRAY2BGR)))
-        return Image(now_s, np.repeat(picture[..., None], 3, axis=-1))
+            return CompressedImage(now_s, fit_jpeg(colours))
+        return Image(now_s, colours)
 
     def close(self) -> None:
         """Let go of the scene. May be called twice."""
         self._scene.close()
 
 
-def _pose(motion: Motion) -> tuple[float, float, float]:
-    return float(motion.x_m), float(motion.y_m), float(motion.yaw_rad)
-
-
-def open_camera(camera: Camera, layout: Layout, renderer: Renderer) -> PinholeCamera:
-    """Build the scene with the renderer asked for; "auto" tries both for a large picture and keeps the faster one."""
-    if renderer == "tiny" or (renderer == "auto" and camera.width_px * camera.height_px <= SMALL_PX):
-        return PinholeCamera(camera, Scene(layout))
-    scene = Scene(layout, egl=True)
-    if renderer == "egl" and not scene.egl:
-        scene.close()
-        raise ConfigError(
-            "pybullet cannot draw with EGL on this machine",
-            "Install an EGL driver (Debian: libegl1 and libgl1-mesa-dri), or use the renderer 'tiny'.",
-        )
-    chosen = PinholeCamera(camera, scene)
-    chosen_s = frame_time_s(chosen)
-    if renderer == "auto" and scene.egl:
-        other = PinholeCamera(camera, Scene(layout))
-        if frame_time_s(other) < chosen_s:
-            chosen, other = other, chosen
-        other.scene.close()
-    return chosen
-
-
-def frame_time_s(camera: PinholeCamera) -> float:
-    """Return the best time of a few pictures; the first ones also make the driver say what it has to say."""
-    times_s = []
-    with quiet():
-        for _ in range(TRIAL_FRAMES):
-            began_s = time.perf_counter()
-            camera.render(0.0, 0.0, 0.0)
-            times_s.append(time.perf_counter() - began_s)
-    return min(times_s)
+def _pose(motion: Motion) -> Pose:
+    return Pose(float(motion.x_m), float(motion.y_m), float(motion.yaw_rad))

@@ -1,4 +1,4 @@
-"""The digital twin: a robot adapter whose floor is in pybullet, and an arena that knows the truth."""
+"""The digital twin: a robot adapter whose floor is a scene, and an arena that knows the truth."""
 
 import math
 import threading
@@ -14,8 +14,8 @@ from lira.sim_backend.body import Body
 from lira.sim_backend.catalogue import load_world
 from lira.sim_backend.course import Course, footprint_radius_m
 from lira.sim_backend.layout import Layout, build
-from lira.sim_backend.scene import import_pybullet
-from lira.sim_backend.sensors import ROUNDING_S, Renderer, Sensors
+from lira.sim_backend.scenes.opening import Renderer, settle
+from lira.sim_backend.sensors import ROUNDING_S, Sensors
 from lira.sim_backend.world import World
 
 ODOMETRY_PERIOD_S = 0.05
@@ -28,7 +28,9 @@ class Twin:
     in `wait`; with a number it passes by itself, that many times as fast as the monotonic clock. It never runs back,
     not even over a reset. `drive` may be called from any thread and never waits for a picture.
 
-    Raises `MissingExtraError` without pybullet, `ConfigError` for an unknown world or a bad factor.
+    `renderer` is what draws and measures the floor: "sketch" needs nothing more, "tiny" and "egl" are pybullet's, and
+    "auto" is pybullet where it is installed. Raises `ConfigError` for an unknown world, a bad factor, or if pybullet is
+    asked for and missing.
     """
 
     def __init__(
@@ -41,12 +43,11 @@ class Twin:
         realtime_factor: float | None = None,
         renderer: Renderer = "auto",
     ) -> None:
-        import_pybullet()
         if realtime_factor is not None and not 0.0 < realtime_factor < math.inf:
             raise ConfigError(f"real-time factor {realtime_factor} is not positive", "Use 1 for real time.")
         self._profile = profile
         self.world = load_world(world) if isinstance(world, str) else world
-        self._renderer = renderer
+        self._renderer = settle(renderer)
         self._seed = seed
         self._factor = realtime_factor
         self._began_s = time.monotonic()
@@ -75,8 +76,8 @@ class Twin:
 
     @property
     def renderer(self) -> str:
-        """What draws the pictures: "tiny" or "egl"; "none" while the twin is not open."""
-        return self._sensors.renderer if self._sensors is not None else "none"
+        """What draws the pictures: "sketch", "tiny" or "egl"; "none" while the twin is not open."""
+        return self._sensors.drawer if self._sensors is not None else "none"
 
     def open(self) -> None:
         """Build the scene. Raises `ConfigError` if EGL is asked for and this machine has none."""

@@ -1,15 +1,24 @@
-"""In CI (`CI=true`) a skipped test fails unless its reason is expected: a suite that skips itself proves nothing.
+"""How the suite is run: its kinds, what runs beside others and what alone, and what a skip means in CI.
 
+With `--crowd` the suite runs without the tests that are marked `alone`, on several workers. A test of processes that
+fails there may have lacked the time that it needs: it is left open, and has to pass with `--alone`, which runs what is
+marked and what was left open, one after the other. A few at most, and none of another kind: that is a failure at once.
+
+In CI (`CI=true`) a skipped test fails unless its reason is expected: a suite that skips itself proves nothing.
 Property tests try the same examples in every run; `pytest --hypothesis-profile=explore` looks for new ones.
 """
 
 import os
 import signal
-from collections.abc import Generator
+import sys
+import tempfile
+from collections.abc import Generator, Iterator
+from pathlib import Path
 
 import pytest
 from hypothesis import settings
 from kinds import kind_of
+from loopback import take_own_loopback
 
 # A shell that runs the suite in the background ignores SIGINT, and so would every process that a test starts.
 signal.signal(signal.SIGINT, signal.default_int_handler)
@@ -22,7 +31,67 @@ settings.load_profile("steady")
 EXPECTED_SKIPS = {
     "over the bus in real time the answer is a step behind",
     "in lockstep silence stops time",
+    "no package index answers",
 }
+OPEN = "lira/open"  # in pytest's cache: what failed in the crowd
+MOST_OPEN = 20
+_failed: dict[str, bool] = {}  # whether it may be left open, by the name of what failed
+
+
+def pytest_addoption(parser: pytest.Parser) -> None:
+    """Declare the two halves of a run."""
+    parser.addoption("--crowd", action="store_true", help="what can run beside others, on several workers")
+    parser.addoption("--alone", action="store_true", help="what --crowd leaves out, and what it left open")
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    """Keep a worker to itself."""
+    if hasattr(config, "workerinput") and sys.platform == "linux":
+        take_own_loopback()
+
+
+def pytest_ignore_collect(collection_path: Path, config: pytest.Config) -> bool | None:
+    """With `-m unit` do not even import what is none: that takes longer than the unit tests."""
+    asked, is_test = config.getoption("markexpr"), collection_path.match("test_*.py")
+    return True if asked == "unit" and is_test and kind_of(collection_path) != "unit" else None
+
+
+def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
+    """Mark every test by its kind (`kinds.py`), and choose those of this half of the run."""
+    for item in items:
+        item.add_marker(kind_of(item.path))
+    if config.getoption("crowd"):
+        items[:] = [item for item in items if item.get_closest_marker("alone") is None]
+    elif config.getoption("alone"):
+        left_open = config.cache.get(OPEN, [])
+        items[:] = [item for item in items if item.get_closest_marker("alone") or item.nodeid in left_open]
+
+
+def pytest_runtest_logreport(report: pytest.TestReport) -> None:
+    """Note what failed."""
+    if report.failed:
+        _failed[report.nodeid] = "processes" in report.keywords
+
+
+@pytest.hookimpl(trylast=True)
+def pytest_sessionfinish(session: pytest.Session) -> None:
+    """Leave open what failed in a crowd."""
+    config = session.config
+    if not config.getoption("crowd") or hasattr(config, "workerinput"):
+        return
+    config.cache.set(OPEN, sorted(_failed))
+    if session.exitstatus == pytest.ExitCode.TESTS_FAILED and all(_failed.values()) and len(_failed) <= MOST_OPEN:
+        session.exitstatus = pytest.ExitCode.OK
+
+
+@pytest.fixture(autouse=True, scope="session")
+def lock_files_of_their_own(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
+    """Robots lock their names in the temporary folder: those of one worker are no other's, and do not pile up."""
+    with pytest.MonkeyPatch.context() as patch:
+        folder = str(tmp_path_factory.mktemp("locks"))
+        patch.setenv("TMPDIR", folder)
+        patch.setattr(tempfile, "tempdir", folder)
+        yield
 
 
 def fail_if_unexpected(report: pytest.TestReport | pytest.CollectReport) -> None:
@@ -33,12 +102,6 @@ def fail_if_unexpected(report: pytest.TestReport | pytest.CollectReport) -> None
     if reason not in EXPECTED_SKIPS:
         report.outcome = "failed"
         report.longrepr = f"skipped in CI, which has everything it needs: {reason}"
-
-
-def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Mark every test by its kind (`kinds.py`)."""
-    for item in items:
-        item.add_marker(kind_of(item.path))
 
 
 if os.environ.get("CI") == "true":

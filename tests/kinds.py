@@ -1,7 +1,7 @@
 """Which kind of test a file holds, by what it imports: nobody has to remember to mark one.
 
 `unit`: pure, in milliseconds; `twin`: renders, looks ahead or trains; `processes`: starts processes, threads of a
-server, a bus or a line, so that it wants the machine for itself.
+server, a bus or a line, and mostly waits for them.
 """
 
 import ast
@@ -21,6 +21,7 @@ PROCESSES = (
     "lira.robot.supervisor",
     "lira.tools.bench",
     "lira.tools.launch",
+    "lira.tools.web.server",
     "lira.sim_backend.emulators.wire",
     "lira.fusion.learning.trainer",
     "multiprocessing",

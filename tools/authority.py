@@ -23,6 +23,7 @@ from cryptography.hazmat.primitives.serialization import (
 )
 from cryptography.x509.oid import ExtendedKeyUsageOID, NameOID
 
+from lira.hal.bus.expiry import SOON_DAYS
 from lira.hal.bus.keys import CA, CERTIFICATE, KEY, KEY_MODE, NAME, NAMES, ROLES, Role, load_roles
 from lira.hal.errors import ConfigError, StorageError
 
@@ -31,7 +32,6 @@ REVOKED = "revoked"
 AUTHORITY_LIFE = timedelta(days=3650)
 ROBOT_LIFE = timedelta(days=730)
 PEER_LIFE = timedelta(days=30)  # a lost laptop that nobody misses is shut out by then
-SOON_DAYS = 7
 CLOCK_SKEW = timedelta(days=1)  # a robot without a battery for its clock may wake up yesterday
 
 

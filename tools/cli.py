@@ -41,6 +41,7 @@ VERBS = {
     "new": Verb("lira.tools.verbs.new", "begin an expert, a method, a robot, a sensor or a world of your own"),
     "joystick": Verb("lira.tools.verbs.joystick", "drive by hand: a gamepad on this machine, straight to the robot"),
     "console": Verb("lira.tools.verbs.console", "watch the robot learn on a screen"),
+    "web": Verb("lira.tools.verbs.web", "watch, teach and drive the robot from a page in the browser"),
     "report": Verb("lira.tools.verbs.report", "make the HTML page of a recorded run"),
     "labels": Verb("lira.tools.verbs.labels", "look through a log of labels for damage, and repair it"),
     "keys": Verb("lira.tools.verbs.keys", "make the keys that say who may drive a robot, and encrypt the bus"),
@@ -48,6 +49,7 @@ VERBS = {
         "lira.tools.verbs.stop_test", "break things while a robot drives, and measure how soon it stands"
     ),
     "parity": Verb("lira.tools.verbs.parity", "the same motions on two robots, and where they differ"),
+    "doctor": Verb("lira.tools.verbs.doctor", "what is wrong with this machine and its devices, and the remedy"),
     "world": Verb("lira.tools.verbs.world", "draw a world from above and as the camera sees it"),
     "bench": Verb("lira.tools.verbs.bench", "measure speed on this machine"),
 }
@@ -57,11 +59,13 @@ EXTRAS = {
     "pybullet": "sim",
     "serial": "robot",
     "openni": "robot",
+    "av": "video",
     "joblib": "experiment",
+    "aiohttp": "web",
+    "segno": "web",
     "torch": "learn",
     "safetensors": "drive",
     "threadpoolctl": "drive",
-    "evdev": "joystick",
     "pygame": "console",
     "cryptography": "keys",
 }

@@ -1,10 +1,11 @@
-"""Types of command-line arguments. What does not fit is refused by argparse, with exit status 2."""
+"""Arguments that several verbs have, and their types. What does not fit is refused by argparse, with exit status 2."""
 
 import argparse
 
 from lira.fusion.experts.tasks import TASKS
+from lira.hal.bus.endpoint import DEFAULT_ENDPOINT, DEFAULT_ROBOT
 
-ENDPOINT = "127.0.0.1:7447"
+DEFAULT = "(default: %(default)s)"
 
 
 def natural(text: str) -> int:
@@ -18,17 +19,63 @@ def natural(text: str) -> int:
     return value
 
 
-def add_robot(parser: argparse.ArgumentParser) -> None:
-    """Declare which robot, where it is reached, and whose experts go with it."""
+def add_client(parser: argparse.ArgumentParser) -> None:
+    """Declare which robot on the bus is meant: `--name` and `--connect`."""
     add = parser.add_argument
-    add("--name", default="rosbot", help="the robot's name on the bus (default: %(default)s)")
-    add("--connect", default=ENDPOINT, metavar="HOST:PORT", help="where the robot listens (default: %(default)s)")
+    add("--name", default=DEFAULT_ROBOT, help=f"the robot's name on the bus {DEFAULT}")
+    add("--connect", default=DEFAULT_ENDPOINT, metavar="HOST:PORT", help=f"where the robot listens {DEFAULT}")
+
+
+def add_server(parser: argparse.ArgumentParser) -> None:
+    """Declare as which robot on the bus something is served: `--name`, `--listen` and `--insecure`."""
+    add = parser.add_argument
+    add("--name", default=DEFAULT_ROBOT, help=f"robot's name: every key on the bus begins with it {DEFAULT}")
     add(
+        "--listen",
+        default=DEFAULT_ENDPOINT,
+        metavar="HOST:PORT",
+        help="where drivers connect; 0.0.0.0:7447 lets other machines in (default: %(default)s, this machine only)",
+    )
+    add("--insecure", action="store_true", help="let other machines in without keys (see lira keys)")
+
+
+def add_profile(parser: argparse.ArgumentParser, default: str, what: str = "robot") -> None:
+    """Declare `--profile`."""
+    parser.add_argument("--profile", default=default, help=f"{what} by name or .toml file {DEFAULT}")
+
+
+def add_world(parser: argparse.ArgumentParser, default: str, what: str = "world") -> None:
+    """Declare `--world`."""
+    parser.add_argument("--world", default=default, help=f"{what} by name or .toml file {DEFAULT}")
+
+
+def add_layout(parser: argparse.ArgumentParser, what: str) -> None:
+    """Declare `--layout`."""
+    parser.add_argument("--layout", type=natural, default=0, help=f"{what} {DEFAULT}")
+
+
+def add_seed(parser: argparse.ArgumentParser, what: str) -> None:
+    """Declare `--seed`; `what` it decides."""
+    parser.add_argument("--seed", type=natural, default=0, help=f"{what} {DEFAULT}")
+
+
+def add_json(parser: argparse.ArgumentParser) -> None:
+    """Declare `--json`, which `lira.tools.output.machine` heeds."""
+    parser.add_argument("--json", metavar="FILE", help="write a JSON object to FILE (-: standard output)")
+
+
+def add_arena(parser: argparse.ArgumentParser) -> None:
+    """Declare `--arena`."""
+    parser.add_argument(
         "--arena",
         metavar="HOST:PORT",
-        help="where the twin behind a robot tells the truth, if the robot is on that twin's devices (its --arena)",
+        help="of a robot on a twin's devices: where that twin tells the truth (its --arena)",
     )
-    add(
+
+
+def add_pair(parser: argparse.ArgumentParser) -> None:
+    """Declare `--experts`."""
+    parser.add_argument(
         "--experts",
         metavar="PAIR",
         help=f"whose experts: a task ({', '.join(TASKS)}), TASK@SEED, or a folder with camera.safetensors and "
@@ -37,11 +84,22 @@ def add_robot(parser: argparse.ArgumentParser) -> None:
 
 
 def add_shield(parser: argparse.ArgumentParser, who: str) -> None:
-    """Declare whether somebody drives behind a shield."""
+    """Declare `--shield`; `who` drives behind it."""
     parser.add_argument(
         "--shield",
         action="store_true",
         help=f"{who}: a turn that would touch what the lidar sees gives way to the nearest one that does not",
+    )
+
+
+def add_expert(parser: argparse.ArgumentParser) -> None:
+    """Declare `--expert`."""
+    parser.add_argument(
+        "--expert",
+        action="append",
+        default=[],
+        metavar="MODULE:OBJECT",
+        help="beside the pair, an expert of your own: a function of lira.Features; may be given several times",
     )
 
 

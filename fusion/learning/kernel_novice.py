@@ -8,6 +8,7 @@ from torch import Tensor
 
 from lira.fusion.inference.kernel_net import NEVER, KernelNet
 from lira.fusion.learning.labels import Label, mirror
+from lira.fusion.learning.learned_policy import Contradiction, Part
 from lira.fusion.learning.novice import LearningSettings, Novice
 from lira.fusion.policies.kernel import ANGULAR, KernelRidge, KernelSettings
 from lira.fusion.preprocess import Features
@@ -25,7 +26,7 @@ class KernelNovice(Novice):
         sees = network.architecture
         self._settings = settings
         self._mirrored = mirrored
-        self._sources: list[str] = []
+        self._given: list[tuple[str, Action]] = []  # who gave each label, and what it says
         self._group = 0
         self.limit = math.inf  # the largest deviation of its turn in the proving runs since the last label
         self.ridge = KernelRidge(dict(zip(sees.shapes, sees.trunk_sizes, strict=True)), settings)
@@ -59,20 +60,38 @@ class KernelNovice(Novice):
 
     def remember(self, label: Label) -> None:
         """Learn a label. What one source shows in a row is a group: its labels say little about each other's worth."""
-        if self._sources[-1:] != [label.source]:
+        if not self._given or self._given[-1][0] != label.source:
             self._group += 1
         human = label.source == "human"
         for each in (label, mirror(label)) if self._mirrored else (label,):
             x = self._x(each.features)
             self.ridge.add(x, each.action, each.weight, human=human, group=self._group, label=self.stored)
-        self._sources.append(label.source)
+        self._given.append((label.source, label.action))
         self.stored += 1
         self.training_steps += 1
         self.limit = math.inf
 
-    def set_aside(self) -> list[tuple[int, str]]:
-        """Number, in the order in which they were stored, and source of the labels that contradict the rest."""
-        return [(number, self._sources[number]) for number in self.ridge.aside]
+    def set_aside(self) -> list[Contradiction]:
+        """Labels that contradict the rest, with what the others say there."""
+        found = []
+        for number, example in self.ridge.aside.items():
+            source, action = self._given[number]
+            linear, angular = self.ridge.act(self.ridge.x[example])
+            mirrored = float(self.ridge.y[example, ANGULAR]) != action[ANGULAR]
+            found.append(Contradiction(number, source, action, (linear, -angular if mirrored else angular)))
+        return found
+
+    def explain(self, features: Features) -> list[Part]:
+        """m(x) = w(x)^T Y by labels: that of a label and that of its mirror image are added."""
+        x = self._x(features)
+        likeness, shares = self.ridge.k(x), self.ridge.shares(x)
+        parts = []
+        for number in sorted(set(self.ridge.labels.tolist())):
+            of_label = self.ridge.labels == number
+            linear, angular = shares[of_label].sum(dim=0).tolist()
+            source, action = self._given[number]
+            parts.append(Part(number, source, action, (linear, angular), float(likeness[of_label].max())))
+        return sorted(parts, key=lambda part: -max(map(abs, part.share)))
 
     def frozen(self) -> KernelNet:
         """Return the network that drives alone: without what was set aside."""

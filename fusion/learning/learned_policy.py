@@ -1,5 +1,6 @@
 """What a method teaches, seen from outside: a policy that takes labels and, now and then, becomes a better one."""
 
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from lira.fusion.learning.labels import Label
@@ -8,6 +9,31 @@ from lira.hal.messages import Action
 
 if TYPE_CHECKING:
     from lira.fusion.inference.networks import DrivingNet
+
+
+@dataclass(frozen=True, slots=True)
+class Part:
+    """A label's part in an action: all labels' `share` together are it, before it is clipped.
+
+    `number` counts the labels in the order in which they were learned, from 0; `action` is what the label says, and
+    `likeness` in [0, 1] how much what was seen then, or its mirror image, is like what is seen now.
+    """
+
+    number: int
+    source: str
+    action: Action
+    share: Action
+    likeness: float
+
+
+@dataclass(frozen=True, slots=True)
+class Contradiction:
+    """A label that is not followed, since the others say otherwise of what was seen there: `others`."""
+
+    number: int
+    source: str
+    action: Action
+    others: Action
 
 
 class LearnedPolicy:
@@ -54,8 +80,12 @@ class LearnedPolicy:
         """How much a label of this source counts."""
         return 1.0
 
-    def set_aside(self) -> list[tuple[int, str]]:
-        """Number and source of the labels it does not believe; none, unless it can tell."""
+    def set_aside(self) -> list[Contradiction]:
+        """Labels it does not believe; none, unless it can tell."""
+        return []
+
+    def explain(self, features: Features) -> list[Part]:  # noqa: ARG002 - for those who can
+        """Which labels make what it does here, the largest part first; none, unless it can tell."""
         return []
 
     def frozen(self) -> "DrivingNet | None":

@@ -39,7 +39,8 @@ _FIELDS = struct.Struct("<dqHHB32sdddd")  # stamp, observation, lap, run, flags,
 _FLAGS_AT, _SOURCE_AT = 20, 21
 _ACTIONS_AT = (53, 61, 69, 77)
 _SOURCE_BYTES = 32
-_STORED, _MIRRORED = 1, 2
+_STORED, _MIRRORED, _CORRECTION = 1, 2, 4
+_FLAGS = _STORED | _MIRRORED | _CORRECTION
 _MOST = 2**16 - 1  # laps and runs are not counted further
 _CRC = struct.Struct("<I")
 
@@ -51,6 +52,10 @@ class Demonstration:
     `source` is "human", an expert's name or "mean"; `novice` is a^N at that time; `features` what was seen.
     `mirrored`: it was learned with left and right exchanged, too. `run` is which opening of the log it was given in,
     from 0; the log sets both.
+
+    A *correction* is a copy of a label that says anew whether it is `stored`: labels are taken back by appending, so
+    none is lost. `read_demonstrations` yields no corrections, but each label as the last of them has it; `undone` is
+    what was stored and is not any more.
     """
 
     stamp_s: float
@@ -63,6 +68,13 @@ class Demonstration:
     features: Features
     mirrored: bool = False
     run: int = 0
+    correction: bool = False
+    undone: bool = False
+
+    @property
+    def key(self) -> tuple[int, float, int, str]:
+        """What tells it from every other label of a log: a run has one at most at a step."""
+        return self.run, self.stamp_s, self.observation, self.source
 
     @property
     def idle(self) -> bool:
@@ -121,7 +133,7 @@ class Format:
             raise ValueError(
                 f"a label of '{record.source}' with {record.features} does not fit a log of {self.words()}"
             )
-        flags = _STORED * record.stored + _MIRRORED * record.mirrored
+        flags = _STORED * record.stored + _MIRRORED * record.mirrored + _CORRECTION * record.correction
         counts = min(record.lap, _MOST), min(record.run, _MOST)
         fields = (record.stamp_s, record.observation, *counts, flags, source, *record.action, *record.novice)
         kept = [
@@ -141,7 +153,7 @@ class Format:
         name = _text(source.rstrip(b"\0"))
         # A nan among others need not be the largest of them; in the sum it shows.
         finite = math.isfinite(stamp_s + sum(actions))
-        if not (name and finite and max(map(abs, actions)) <= LIMIT and flags <= _STORED | _MIRRORED):
+        if not (name and finite and max(map(abs, actions)) <= LIMIT and flags <= _FLAGS):
             return None
         if features is None:
             return None
@@ -156,13 +168,14 @@ class Format:
             features=features,
             mirrored=bool(flags & _MIRRORED),
             run=run,
+            correction=bool(flags & _CORRECTION),
         )
 
     def _features(self, data: bytes) -> Features | None:
         """What was seen, of a record's bytes; None if that cannot have been."""
         arrays, at = {}, _FIELDS.size
         for name, shape in self.features:
-            kept = np.frombuffer(data, _dtype(name), math.prod(shape), at).reshape(shape)
+            kept = np.frombuffer(data, _dtype(name), math.prod(shape), at).reshape(shape).copy()  # learners may write
             arrays[name] = MODALITIES[name].restore(kept)
             at += kept.nbytes
             if not (np.abs(arrays[name]).max() <= LIMIT and math.isfinite(arrays[name].sum())):
@@ -173,7 +186,7 @@ class Format:
         """Return where in a block a record may begin: few places, so that few checksums are reckoned."""
         count = max(len(block) - self.record_bytes + 1, 0)
         data = np.frombuffer(block, np.uint8)
-        likely = (data[_FLAGS_AT:][:count] <= _STORED | _MIRRORED) & (data[_SOURCE_AT:][:count] > ord(" "))
+        likely = (data[_FLAGS_AT:][:count] <= _FLAGS) & (data[_SOURCE_AT:][:count] > ord(" "))
         for at in _ACTIONS_AT:  # the top byte of a number below 2
             likely &= data[at + 7 :][:count] & 0x7F <= 0x3F
         return np.flatnonzero(likely)

@@ -194,8 +194,23 @@ class DemonstrationLog:
 def read_demonstrations(path: Path) -> Iterator[Demonstration]:
     """Stream the whole labels of a log, one at a time, whatever is damaged between them; the log may be in use.
 
+    Each is stored, or not, as its last correction has it. A label that was damaged comes from its correction.
     Raises `StorageError` for a file that is missing, no log, or whose header is damaged.
     """
+    stored = {record.key: record.stored for record in read_records(path) if record.correction}
+    met = set()
+    for record in read_records(path):
+        if record.key in stored and record.key not in met:
+            met.add(record.key)
+            now = stored[record.key]
+            undone = (record.stored or record.correction) and not now
+            yield replace(record, stored=now, undone=undone, correction=False)
+        elif not record.correction:
+            yield record
+
+
+def read_records(path: Path) -> Iterator[Demonstration]:
+    """Stream what is in a log as it is, corrections among the labels. Raises what `read_demonstrations` raises."""
     try:
         with open_regular(path) as file:
             form = read_format(file, path)

@@ -32,8 +32,9 @@ class Damage:
 
 @dataclass(frozen=True, slots=True)
 class Survey:
-    """What was found in a log: where its records begin, the whole ones and their newest run, and what is no label.
+    """What was found in a log: where its records begin, the whole labels and their newest run, and what is no label.
 
+    `corrections` say anew of labels whether they are stored, and are not counted among them.
     `torn_bytes` at the end of the file are the rest of a write that did not end, and zeros behind it; without them
     there is nothing behind byte `end`.
     """
@@ -45,6 +46,7 @@ class Survey:
     damages: tuple[Damage, ...] = ()
     end: int = 0
     torn_bytes: int = 0
+    corrections: int = 0
 
     @property
     def lost_bytes(self) -> int:
@@ -87,21 +89,22 @@ def pieces(file: BinaryIO, form: Format, at: int) -> Iterator[tuple[bytes, Demon
 
 def survey(file: BinaryIO, form: Format, begin: int) -> Survey:
     """Go through all of a log whose records begin at byte `begin`."""
-    count, newest_run, end = 0, -1, begin
+    count, corrections, newest_run, end = 0, 0, -1, begin
     damages: list[Damage] = []
     for piece in pieces(file, form, begin):
         if isinstance(piece, Damage):
             damages.append(piece)
             end = piece.at + piece.length
         else:
-            count, newest_run = count + 1, max(newest_run, piece[1].run)
+            correction, newest_run = piece[1].correction, max(newest_run, piece[1].run)
+            count, corrections = count + (not correction), corrections + correction
             end = file.tell()
     torn_bytes = 0
     if damages and damages[-1].at + damages[-1].length == end:
         tail = damages[-1]
         if _content_bytes(file, tail) < form.record_bytes:
             torn_bytes, end = tail.length, tail.at
-    return Survey(form, begin, count, newest_run, tuple(damages), end, torn_bytes)
+    return Survey(form, begin, count, newest_run, tuple(damages), end, torn_bytes, corrections)
 
 
 def lock(file: int, path: Path) -> None:

@@ -5,9 +5,10 @@ from collections.abc import Callable
 from dataclasses import replace
 
 from lira.fusion.control import Step
+from lira.fusion.learning.learned_policy import LearnedPolicy
 from lira.fusion.log.counts import Ledger
 from lira.fusion.log.label_log import Demonstration
-from lira.fusion.log.run_log import Pose, Record, StepRecord
+from lira.fusion.log.run_log import ContradictionRecord, Pose, Record, StepRecord
 from lira.fusion.methods.base import Call, Proposal
 from lira.fusion.preprocess import MODALITIES
 from lira.hal.messages import Decision
@@ -37,12 +38,25 @@ class Journal:
         self._publish = publish
         self._began_s = time.monotonic()
         self._call = Call.NONE
+        self._given = 0  # labels handed to the log
+        self._learned: list[tuple[int, int, float]] = []  # place in the log, lap and time of those that were stored
         self._reserved: dict[int, tuple[Proposal, Demonstration]] = {}  # the proposal too: so its id stays its own
 
     @property
     def elapsed_s(self) -> float:
         """Wall-clock time since the journal was opened."""
         return time.monotonic() - self._began_s
+
+    def contradictions(self, novice: LearnedPolicy) -> tuple[ContradictionRecord, ...]:
+        """What a novice that learned all of this journal's labels set aside, as the log has it."""
+        found = novice.set_aside()
+        if found and len(self._learned) < novice.stored:
+            return ()  # it learned before the journal began, and nobody knows which these are
+        places = [(self._learned[each.number], each) for each in found]
+        return tuple(
+            ContradictionRecord(number, each.source, lap, stamp_s, each.action, each.others)
+            for (number, lap, stamp_s), each in places
+        )
 
     def note(self, step: Step, *, phase: str, lap: int, layout: int, training_steps: int) -> None:
         """Record one step."""
@@ -83,10 +97,16 @@ class Journal:
             if step.lesson.reserved:
                 self._reserved[id(step.proposal)] = step.proposal, label
             else:
-                self._keep(label)
+                self._hand_on(label)
         for settled in step.lesson.settled:
             _, label = self._reserved.pop(id(settled.proposal))
-            self._keep(replace(label, stored=settled.stored))
+            self._hand_on(replace(label, stored=settled.stored))
+
+    def _hand_on(self, label: Demonstration) -> None:
+        self._keep(label)
+        if label.stored:
+            self._learned.append((self._given, label.lap, label.stamp_s))
+        self._given += 1
 
     def _decision(self, step: Step, phase: str, lap: int, training_steps: int) -> Decision:
         choice, proposal = step.lesson.choice, step.proposal

@@ -15,7 +15,7 @@ import msgspec
 from lira.fusion.log.counts import Account
 from lira.hal.config import MALFORMED, open_regular
 from lira.hal.errors import StorageError
-from lira.hal.messages import CourseState, Decision
+from lira.hal.messages import Action, CourseState, Decision
 
 LINE_BYTES = 2**20  # ten times what a step with the largest picture takes
 
@@ -111,11 +111,22 @@ class RunRecord(msgspec.Struct, frozen=True, tag="run"):
     idle_frames: str = "label"  # as in `LearningSettings`
 
 
+class ContradictionRecord(msgspec.Struct, frozen=True):
+    """A label that the novice does not follow, since the `others` say otherwise; `number` is its place in the log."""
+
+    number: int
+    source: str
+    lap: int
+    stamp_s: float
+    action: Action
+    others: Action
+
+
 class ResultRecord(msgspec.Struct, frozen=True, tag="result"):
     """The end of a run. `converged` is False for a run that met its cap: reported as censored, never dropped.
 
     `proof` says what `converged` means: the novice alone passed a lap of the layout it was taught on ("own"), or so
-    many fresh ones in a row ("fresh:3").
+    many fresh ones in a row ("fresh:3"). `contradictions` are labels that were set aside.
     """
 
     converged: bool
@@ -130,6 +141,7 @@ class ResultRecord(msgspec.Struct, frozen=True, tag="result"):
     elapsed_s: float
     account: Account = Account()
     proof: str = "own"
+    contradictions: tuple[ContradictionRecord, ...] = ()
 
 
 Record = RunRecord | StepRecord | LapRecord | ResultRecord

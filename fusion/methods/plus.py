@@ -4,6 +4,7 @@
   what active experts agree on.
 - Reservation: an expert's label counts only once a second has passed without the human correcting what the expert did.
 - A choice as an answer: instead of driving, the human may give control to an expert for a while.
+- Practice: a novice that was once examined drives as it will alone, and is only corrected.
 - Sureness: where the experts disagree and the novice says that it knows, it drives, and nobody is called.
 
 Its novice is that of `fusion/kernel.py`.
@@ -30,6 +31,7 @@ class PlusSettings(MethodSettings, frozen=True, tag="plus"):
     reserve_s: float = 1.0  # an expert's label waits so long for the human's objection
     handover_s: float = 1.0  # an expert that was given control keeps it so long
     sure: float | None = None  # surer than at all but this share of what the human showed, the novice is not helped
+    practice: bool = False  # from its first proving run on, the novice drives and the human corrects it
     ask: bool = False  # on unseen layouts it stops and asks where it doubts
 
     def build(self, context: Context) -> Method:
@@ -45,6 +47,7 @@ class LiraPlus(LiraSpf):
         self._reserve = round(settings.reserve_s / period_s)
         self._handover_steps = round(settings.handover_s / period_s)
         self._gifts = 0
+        self._examined = False
         super().__init__(experts, novice, settings.lira, period_s)
 
     def reset(self) -> None:
@@ -74,6 +77,9 @@ class LiraPlus(LiraSpf):
             return replace(proposal, choice=Choice(self._driver, action, label=action, given=self._gifts), speed=1.0)
         if self.novice.stored < self._plus.prefill:
             return self._prefill(proposal)
+        if self._practises:
+            a_n = self.novice.alone(features)
+            return replace(proposal, choice=Choice("novice", a_n), novice=a_n, speed=1.0)
         if proposal.choice.call is not Call.NONE and self.novice.trained and self._sure(features):
             return replace(proposal, choice=Choice("novice", proposal.novice), speed=1.0)
         return proposal
@@ -96,7 +102,8 @@ class LiraPlus(LiraSpf):
         return Lesson(proposal.choice, reserved=True, settled=settled)
 
     def alone(self, phase: str) -> Method:
-        """The novice, which on unseen layouts may stop and ask."""
+        """The novice, which on unseen layouts may stop and ask. Who drives a proving run is examined."""
+        self._examined = True
         if phase == "unseen" and self.calls_alone:
             return Doubtful(self.novice.alone, self.novice.doubts)
         return super().alone(phase)
@@ -105,6 +112,14 @@ class LiraPlus(LiraSpf):
     def calls_alone(self) -> bool:
         """Whether it asks on unseen layouts."""
         return self._plus.ask
+
+    def policy(self, driver: str) -> Policy:
+        """The policy behind a driver's name: a novice that practises drives as it does alone."""
+        return self.novice.alone if driver == "novice" and self._practises else super().policy(driver)
+
+    @property
+    def _practises(self) -> bool:
+        return self._plus.practice and self._examined
 
     def _drop(self) -> tuple[Settled, ...]:
         dropped = tuple(Settled(past, stored=False) for past in self._reserved)

@@ -154,6 +154,7 @@ PLUS = (
     _plus("plus-no-cleaning", kernel=KernelSettings(contradicts=None)),
     _plus("plus-no-gain", kernel=KernelSettings(gain=1.0)),
     _plus("plus-network", kernel=None),
+    _plus("plus-practice", approach=PlusSettings(practice=True)),
     _plus("plus-sure", approach=PlusSettings(sure=0.25)),
     _plus("plus-ask", approach=PlusSettings(ask=True)),
     _plus("plus-own", syllabus=THESIS),

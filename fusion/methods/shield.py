@@ -24,6 +24,7 @@ from numpy.typing import NDArray
 
 from lira.fusion.methods.base import STAND, Call, Choice, Lesson, Method, Policy, Proposal
 from lira.fusion.preprocess import Features
+from lira.hal.errors import ConfigError
 from lira.hal.messages import Action, FloatArray
 from lira.hal.profile import RobotProfile
 
@@ -39,9 +40,14 @@ Floats = NDArray[np.float64]
 
 @dataclass(frozen=True, slots=True)
 class Shield:
-    """What it has to know of a robot."""
+    """What it has to know of a robot. Raises `ConfigError` for one that does not learn from a lidar."""
 
     profile: RobotProfile
+
+    def __post_init__(self) -> None:
+        if "scan" not in self.profile.features.inputs:
+            what = f"'{self.profile.name}' has no lidar among its inputs for a shield to look with"
+            raise ConfigError(what, "Leave --shield out; the robot's own protective field does not need it.")
 
     def points(self, scan: FloatArray) -> Floats:
         """p [m, 2] of a scan as the networks see it, float32 [bins]; too close counts as at the shortest range."""

@@ -193,9 +193,14 @@ class KernelRidge:
         return self._fit
 
     @property
-    def aside(self) -> list[int]:
-        """The labels of which an example is set aside."""
-        return sorted(set(self.labels[~self.fit.used].tolist()))
+    def aside(self) -> dict[int, int]:
+        """The labels of which an example is set aside, and the first such example of each."""
+        examples = torch.nonzero(~self.fit.used)[:, 0].flip(0)
+        return dict(sorted((int(self.labels[i]), int(i)) for i in examples))
+
+    def shares(self, x: Tensor) -> Tensor:
+        """What each example adds to m(x) [n, 2]: m(x) = w(x)^T Y with w(x) = P k(x)."""
+        return (self.fit.p @ self.k(x))[:, None] * self.y
 
     def act(self, x: Tensor, gain: float = 1.0) -> tuple[float, float]:
         """m(x), the turn times `gain`, clipped."""

@@ -116,15 +116,18 @@ class Session:
         Returns whether the last ones were passed; False if `laps` were not enough.
         """
         proven = False
-        pupil = self._pupil
         for lap in range(1, laps + 1):
-            self._laps = lap
-            self._lap(pupil, course.taught(lap), "train", lap, teacher)
-            pupil.reset()  # the lap is over: who learns by laps learns now
-            proven = pupil.novice.trained and self.prove(course, lap)
+            self.train(course, teacher, lap)
+            proven = self._pupil.novice.trained and self.prove(course, lap)
             if proven and not all_laps:
                 break
         return proven
+
+    def train(self, course: Course, teacher: Teacher | None, lap: int) -> None:
+        """One training lap, numbers counting from 1."""
+        self._laps = lap
+        self._lap(self._pupil, course.taught(lap), "train", lap, teacher)
+        self._pupil.reset()  # the lap is over: who learns by laps learns now
 
     def prove(self, course: Course, lap: int = 1) -> bool:
         """The proving runs that belong to a lap, until it is plain how they end. Returns whether enough were passed."""
@@ -134,6 +137,10 @@ class Session:
             if failed > course.spare:
                 return False
         return True
+
+    def score(self, runs: Sequence[Sequence[Drive]], lap: int) -> list[LapRecord]:
+        """Proving runs after a lap, whatever becomes of the others."""
+        return [self._alone(drives, "prove", lap) for drives in runs]
 
     def show(self, drives: Sequence[Drive], teacher: Teacher | None = None) -> list[LapRecord]:
         """Let the frozen novice drive, each drive a lap of its own; after a crash it goes on behind it.
@@ -158,6 +165,7 @@ class Session:
             elapsed_s=self._journal.elapsed_s,
             account=ledger.account,
             proof=proof,
+            contradictions=() if self._apprentice is None else self._journal.contradictions(self._apprentice.novice),
         )
 
     @property

@@ -47,6 +47,7 @@ class TeacherSettings(Table, frozen=True):
     gain_sigma: float = 0.15  # over- and understeer, log-normal, per intervention
     wrong_direction: Share = 0.05
     missed: Share = 0.02
+    notices_s: float = 3.0  # a danger that was missed is seen so much later, if it lasts: a robot that stands and asks
 
 
 NOBODY: Mapping[str, Policy] = MappingProxyType({})
@@ -191,7 +192,7 @@ class ScriptedTeacher:
             median = self._settings.called_delay_s if alert else self._settings.delay_s
             missed = self._random.random() < self._settings.missed
             delay = median * math.exp(self._settings.delay_sigma * self._random.standard_normal())
-            self._react_at_s = math.inf if missed else now_s + delay
+            self._react_at_s = now_s + delay + missed * self._settings.notices_s
         return now_s >= self._react_at_s - 1e-9
 
     def _take_over(self, now_s: float) -> None:

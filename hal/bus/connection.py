@@ -90,6 +90,11 @@ class Connection:
             self._declared.add(declared)
         return declared
 
+    def check_open(self, error: zenoh.ZError) -> None:
+        """Raise `BusError` if that went wrong because it is closed for good."""
+        if self.closed:
+            raise BusError(f"the bus is closed: {error}", "Open it again.") from error
+
     def close(self, timeout_s: float) -> bool:
         """Close for good; False if a dead link kept it from closing in time. May be called twice.
 

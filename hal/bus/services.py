@@ -19,7 +19,7 @@ REALTIME: Literal["realtime"] = "realtime"
 LOCKSTEP: Literal["lockstep"] = "lockstep"
 ANSWER_S = 2.0
 
-Token = Annotated[int, msgspec.Meta(ge=0)]  # msgspec keeps integers within 64 bits
+Epoch = Annotated[int, msgspec.Meta(ge=0)]  # msgspec keeps integers within 64 bits
 Moment = Annotated[float, msgspec.Meta(ge=-LARGEST, le=LARGEST)]
 
 
@@ -28,7 +28,7 @@ class Info(msgspec.Struct, frozen=True):
 
     profile: RobotProfile
     mode: Literal["realtime", "lockstep"]
-    epoch: Token
+    epoch: Epoch
     arena: msgspec.Raw = msgspec.Raw(b"null")
 
     def to_json(self) -> bytes:

@@ -140,17 +140,12 @@ FROM_OPERATORS: tuple[Topic[Any], ...] = (
 )
 
 
-_BY = "/by/"
+BY = "/by/"
 
 
 def named(topic: Topic[M], commander: str) -> Topic[M]:
     """A topic of commands as one commander has it: with keys everybody commands in their own name, and in no other."""
-    return replace(topic, key=f"{topic.key}{_BY}{commander}")
-
-
-def commander_of(key: str) -> str:
-    """Whose command came on a key, "" on a plain one."""
-    return key.rpartition(_BY)[2] if _BY in key else ""
+    return replace(topic, key=f"{topic.key}{BY}{commander}")
 
 
 # Keys that answer queries. What is a permission of its own is a key of its own.

@@ -19,6 +19,27 @@ LEASE_MS = 2000
 OPEN_MS = 2000
 CONNECT_MS = 3000
 FILES = 65536
+# Of every session.
+SETTINGS = {
+    "connect/timeout_ms": CONNECT_MS,
+    "connect/exit_on_failure": False,
+    "connect/retry": {"period_init_ms": 200, "period_max_ms": 1000, "period_increase_factor": 2},
+    # Do not wait for the datagrams: whoever opens watches links from the first on.
+    "scouting/delay": 0,
+    "scouting/multicast/enabled": False,
+    "scouting/gossip/enabled": False,
+    "transport/unicast/max_links": 2,
+    # Whoever has no keys for a robot that wants some hears it after this long.
+    "transport/unicast/open_timeout": OPEN_MS,
+    # Whoever begins to connect and says no more holds up a close for this long.
+    "transport/unicast/accept_timeout": OPEN_MS,
+    "transport/link/tx/lease": LEASE_MS,
+    "transport/link/rx/max_message_size": MESSAGE_BYTES,
+    # It can lose a message when a receiver stalls.
+    "transport/shared_memory/enabled": False,
+    # Late readers of a latched topic are served by its time stamp.
+    "timestamping/enabled": True,
+}
 
 
 def open_session(
@@ -46,29 +67,12 @@ def open_session(
         _make_room()
     config = zenoh.Config()
     for key, value in {
+        **SETTINGS,
         # Both ends are peers: a client would use one link only. What peers say is passed on to clients alone.
         "mode": "client" if watch else "peer",
         "listen/endpoints": [] if listen is None else _links(listen, keys),
         "connect/endpoints": [] if connect is None else _connecting(_links(connect, keys), watch=watch),
-        "connect/timeout_ms": CONNECT_MS,
-        "connect/exit_on_failure": False,
-        "connect/retry": {"period_init_ms": 200, "period_max_ms": 1000, "period_increase_factor": 2},
-        # Do not wait for the datagrams: whoever opens watches links from the first on.
-        "scouting/delay": 0,
-        "scouting/multicast/enabled": False,
-        "scouting/gossip/enabled": False,
-        "transport/unicast/max_links": 2,
-        # Whoever has no keys for a robot that wants some hears it after this long.
-        "transport/unicast/open_timeout": OPEN_MS,
-        # Whoever begins to connect and says no more holds up a close for this long.
-        "transport/unicast/accept_timeout": OPEN_MS,
-        "transport/link/tx/lease": LEASE_MS,
-        "transport/link/rx/max_message_size": MESSAGE_BYTES,
         "low_pass_filter": _size_limits(robot if prefix is None else prefix),
-        # It can lose a message when a receiver stalls.
-        "transport/shared_memory/enabled": False,
-        # Late readers of a latched topic are served by its time stamp.
-        "timestamping/enabled": True,
         **({} if keys is None else {"transport/link/tls": keys.link_config()}),
         **({} if listen is None else {"access_control": access_list(robot, None if keys is None else keys.roles)}),
     }.items():
@@ -76,16 +80,18 @@ def open_session(
     try:
         return zenoh.open(config)
     except zenoh.ZError as error:
-        # zenoh nests its reasons in brackets, each with the place in its sources.
-        reason = str(error).split(" at /")[0].split(": [")[-1]
-        if "in use" in reason:
-            raise BusError(
-                f"{listen} is already in use",
-                "Stop the other program (another robot?), or choose another port with --listen HOST:PORT.",
-            ) from error
-        raise BusError(
-            f"cannot open the bus at {listen or connect}: {reason}", "Check the address, and that the robot runs."
-        ) from error
+        raise _told(error, listen, connect) from error
+
+
+def _told(error: zenoh.ZError, listen: str | None, connect: str | None) -> BusError:
+    """What to say when none opens. zenoh nests its reasons in brackets, each with the place in its code."""
+    reason = str(error).split(" at /")[0].split(": [")[-1]
+    if "in use" in reason:
+        remedy = "Stop the other program (another robot?), or choose another port with --listen HOST:PORT."
+        return BusError(f"{listen} is already in use", remedy)
+    return BusError(
+        f"cannot open the bus at {listen or connect}: {reason}", "Check the address, and that the robot runs."
+    )
 
 
 def _make_room() -> None:

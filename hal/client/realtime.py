@@ -16,7 +16,8 @@ import time
 from collections.abc import Callable
 from dataclasses import replace
 
-from lira.hal.bus.bus import Bus, Publisher
+from lira.hal.bus.bus import Bus
+from lira.hal.bus.publisher import Publisher
 from lira.hal.bus.topics import APPLIED, CMD_VEL, SIM_STATE, TELEOP
 from lira.hal.client.sensor_reader import Sense, SensorReader
 from lira.hal.clock import ClockEstimate

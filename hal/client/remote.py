@@ -5,7 +5,8 @@ from contextlib import contextmanager
 
 import msgspec
 
-from lira.hal.bus.bus import CLOSE_S, DEFAULT_ENDPOINT, DEFAULT_ROBOT, Bus
+from lira.hal.bus.bus import CLOSE_S, Bus
+from lira.hal.bus.endpoint import DEFAULT_ENDPOINT, DEFAULT_ROBOT
 from lira.hal.bus.services import LOCKSTEP, Info, info_from_json, reset_time
 from lira.hal.bus.topics import INFO, RESET
 from lira.hal.client.lockstep import LockstepLink

@@ -2,7 +2,8 @@
 
 from typing import Any, Generic, TypeVar
 
-from lira.hal.bus.bus import Bus, Received
+from lira.hal.bus.bus import Bus
+from lira.hal.bus.reader import Received
 from lira.hal.bus.sensors import Stamped, listened_to, observation_of
 from lira.hal.bus.topics import Topic
 from lira.hal.clock import AHEAD_S, is_fresh

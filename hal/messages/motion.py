@@ -4,6 +4,8 @@ import hashlib
 from dataclasses import dataclass
 from enum import StrEnum
 
+Token = tuple[str, int]  # who commands: a name, and a session
+
 
 @dataclass(frozen=True, slots=True)
 class Twist:
@@ -74,7 +76,7 @@ class Command:
     commander: str = ""
 
     @property
-    def token(self) -> tuple[str, int]:
+    def token(self) -> Token:
         """Who commands: the name, and the session, which nobody else knows."""
         return self.commander, self.epoch
 

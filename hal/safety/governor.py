@@ -15,9 +15,10 @@ from dataclasses import replace
 
 from lira.hal.clock import AHEAD_S
 from lira.hal.messages import STOP, Applied, Command, Reason, Source, Twist, is_neutral, session_of
+from lira.hal.messages.motion import Token
 from lira.hal.profile import RobotProfile
 from lira.hal.safety.arming import TRANSITIONS, Event, State
-from lira.hal.safety.lease import Lease, Token
+from lira.hal.safety.lease import Lease
 from lira.hal.safety.protective_field import Clearance, limit_speed
 
 ROUNDING_S = 1e-6  # stamps travel in whole nanoseconds; sums of periods are less exact than that

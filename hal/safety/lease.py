@@ -9,8 +9,9 @@ same session: what is still on its way from there is old.
 import math
 from collections import deque
 
+from lira.hal.messages.motion import Token
+
 REMEMBERED = 64  # sessions that lost the lease
-Token = tuple[str, int]
 
 
 class Lease:

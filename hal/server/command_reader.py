@@ -4,8 +4,9 @@ from collections import OrderedDict
 from collections.abc import Hashable
 
 from lira.hal.bus.attachment import Attachment
-from lira.hal.bus.bus import Bus, Received
-from lira.hal.bus.topics import CMD_VEL, ESTOP, TELEOP, Topic, commander_of, named
+from lira.hal.bus.bus import Bus
+from lira.hal.bus.reader import Received
+from lira.hal.bus.topics import CMD_VEL, ESTOP, TELEOP, Topic, named
 from lira.hal.messages import Command, Source, Twist, is_neutral
 
 EPOCHS = 1 << 64
@@ -101,7 +102,7 @@ class _Commands:
         """Its time is the sender's. A sample without our attachment (a ROS peer's) is judged by its arrival, and its
         hand lets go with a zero: it cannot say so in another way. Such peers are told apart by the id of their session.
         """
-        twist, sent, commander = received.message, received.attachment, commander_of(received.key)
+        twist, sent, commander = received.message, received.attachment, received.commander
         if sent is None:
             released = self._source is Source.TELEOP and is_neutral(twist)
             epoch = int(received.sender, 16) % EPOCHS

@@ -10,7 +10,8 @@ from collections.abc import Callable
 
 import msgspec
 
-from lira.hal.bus.bus import Bus, Question
+from lira.hal.bus.bus import Bus
+from lira.hal.bus.questions import Question
 from lira.hal.bus.services import EstopState
 from lira.hal.bus.topics import ESTOP_LOOK, ESTOP_PRESS, ESTOP_RELEASE
 from lira.hal.safety.governed import GovernedRobot

@@ -4,7 +4,8 @@ from collections.abc import Callable
 
 import msgspec
 
-from lira.hal.bus.bus import Bus, Question
+from lira.hal.bus.bus import Bus
+from lira.hal.bus.questions import Question
 from lira.hal.bus.services import Info
 from lira.hal.bus.topics import INFO, RESET
 from lira.hal.errors import CodecError, LiraError

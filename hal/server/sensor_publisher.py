@@ -2,7 +2,8 @@
 
 from typing import Any
 
-from lira.hal.bus.bus import Bus, Publisher
+from lira.hal.bus.bus import Bus
+from lira.hal.bus.publisher import Publisher
 from lira.hal.bus.sensors import SENSORS, Sensor, Stamped
 from lira.hal.bus.topics import IN_LOCKSTEP
 from lira.hal.messages import Observation

@@ -5,7 +5,8 @@ from collections.abc import Callable
 from contextlib import closing, nullcontext
 
 from lira.hal.bus.access_log import count_refusals
-from lira.hal.bus.bus import DEFAULT_ENDPOINT, DEFAULT_ROBOT, Bus
+from lira.hal.bus.bus import Bus
+from lira.hal.bus.endpoint import DEFAULT_ENDPOINT, DEFAULT_ROBOT
 from lira.hal.port import Arena, Robot
 from lira.hal.safety.governed import GovernedRobot
 from lira.hal.server.server import HalServer, stop_on_signal

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from openni import openni2
+from openni import _openni2, openni2
 from openni.utils import ClosedHandle, InitializationError, OpenNIError
 
 from lira.hal.bus.topics import DEPTH
@@ -135,8 +135,16 @@ def load(folder: Path | None) -> None:
     try:
         openni2.initialize(*([] if folder is None else [str(folder)]))
     except (InitializationError, *FAULTS) as error:
+        forget_failed_load()
         why = (str(error).splitlines() or [type(error).__name__])[-1].strip()
         raise DeviceError(f"OpenNI2 does not load: {why}", INSTALL) from error
+
+
+def forget_failed_load() -> None:
+    """The package keeps a library that did not start and refuses every other; the library believes that it did."""
+    if openni2.loaded_dll_directory is None and _openni2._the_dll is not None:
+        quietly(_openni2.oniShutdown)
+        _openni2._the_dll = None
 
 
 def colour_modes(modes: Any) -> list[Any]:

@@ -11,6 +11,7 @@ from lira.hal.errors import DeviceError, SensorError
 from lira.hal.messages import CompressedImage, Image
 from lira.hal.messages.images import JPEG_START
 from lira.robot.camera.decode import check, decode
+from lira.robot.camera.header import read_header
 from lira.robot.camera.port import LARGEST_BYTES, Picture
 
 PERIOD_S = 1 / 15
@@ -60,6 +61,8 @@ def load(path: Path) -> Picture:
         if path.suffix.lower() in {".jpg", ".jpeg"}:
             check(data, JPEG_START)
             return CompressedImage(stamp_s, data)
+        check(data)
+        read_header(data)
         return Image(stamp_s, np.ascontiguousarray(decode(data)[..., ::-1], np.uint8))
     except OSError as error:
         raise SensorError(f"cannot read {path}: {error.strerror}", "Check the folder.") from error

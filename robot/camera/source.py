@@ -3,23 +3,43 @@
 from pathlib import Path
 from urllib.parse import urlsplit
 
-from lira.hal.errors import ConfigError
+from lira.hal.errors import ConfigError, MissingExtraError
+from lira.robot.camera.address import parse_address, shown
 from lira.robot.camera.port import Source
+
+EXTRAS = {"openni": "robot", "av": "video"}  # which part of the installation brings what a source needs
 
 
 def open_source(url: str, size: tuple[int, int], openni_folder: Path | None, *, depth: bool = False) -> Source:
     """Open `openni:`, `http(s)://` (MJPEG), `rtsp://`, `/dev/video0` or a folder of images.
 
-    `size` (width, height) is asked of sources that have a choice. Raises `DeviceError`, or `ConfigError` for a URL of
-    none of these forms, or one of a source that has no `depth`.
+    `size` (width, height) is asked of sources that have a choice. Raises `DeviceError`; `ConfigError` for a URL of none
+    of these forms, or one of a source that has no `depth`; `MissingExtraError` if it needs what is not installed.
     """
     try:
-        scheme = urlsplit(url).scheme
+        scheme = urlsplit(parse_address(url).url).scheme
     except ValueError as error:
-        raise ConfigError(f"'{url}' is no address: {error}", "Give the camera's own address.") from error
+        raise ConfigError(f"'{shown(url)}' is no address", "Give the camera's own address.") from error
     if depth and scheme != "openni":
         remedy = "Take [depth] out of the profile and depth = true out of the settings, or use openni:."
-        raise ConfigError(f"'{url}' has no depth", remedy)
+        raise ConfigError(f"'{shown(url)}' has no depth", remedy)
+    try:
+        source = _open(url, scheme, size, openni_folder, depth=depth)
+    except ModuleNotFoundError as error:
+        package = str(error.name).split(".")[0]
+        if package not in EXTRAS:
+            raise
+        raise MissingExtraError(package, EXTRAS[package]) from error
+    if source is None:
+        raise ConfigError(
+            f"'{shown(url)}' is no camera",
+            "Use openni: (Astra), /dev/video0 (UVC), http://... (MJPEG), rtsp://..., or a folder of images.",
+        )
+    return source
+
+
+def _open(url: str, scheme: str, size: tuple[int, int], openni_folder: Path | None, *, depth: bool) -> Source | None:
+    """Open what a scheme names; None if it names nothing. Each kind's packages are imported only for it."""
     if scheme == "openni":
         from lira.robot.camera.astra import OpenniSource
 
@@ -36,7 +56,4 @@ def open_source(url: str, size: tuple[int, int], openni_folder: Path | None, *, 
         from lira.robot.camera.folder import FolderSource
 
         return FolderSource(Path(url))
-    raise ConfigError(
-        f"'{url}' is no camera",
-        "Use openni: (Astra), /dev/video0 (UVC), http://... (MJPEG), rtsp://..., or a folder of images.",
-    )
+    return None

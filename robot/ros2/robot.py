@@ -7,7 +7,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any
 
-from lira.hal.bus.bus import Bus, Publisher, Reader
+from lira.hal.bus.bus import Bus
+from lira.hal.bus.publisher import Publisher
+from lira.hal.bus.reader import Reader
 from lira.hal.bus.sensors import SENSORS, listened_to, observation_of
 from lira.hal.bus.topics import CMD_VEL, SENSOR, Topic
 from lira.hal.clock import ClockEstimate, is_fresh

@@ -14,7 +14,8 @@ from pathlib import Path
 import zenoh
 from zenoh.handlers import RingChannel
 
-from lira.hal.bus.bus import Bus, Publisher
+from lira.hal.bus.bus import Bus
+from lira.hal.bus.publisher import Publisher
 from lira.hal.client.remote import RemoteRobot
 from lira.hal.messages import HELD, STOP, Command, Reason, Twist
 

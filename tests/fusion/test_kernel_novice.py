@@ -14,7 +14,6 @@ from lira.fusion.learning.novice import LearningSettings
 from lira.fusion.policies.kernel import KernelSettings
 from lira.fusion.preprocess import Features
 from lira.hal.errors import StorageError
-from lira.tools.runs.folder import aside_words
 
 BINS, FILTERS = 21, 4
 
@@ -79,9 +78,25 @@ def test_a_label_that_all_others_contradict_is_named_with_who_gave_it():
     for _ in range(5):
         learner.remember(label)
     learner.remember(replace(label, action=(1.0, -0.9), source="camera"))
-    assert learner.set_aside() == [(5, "camera")]
-    assert aside_words(learner.set_aside()).endswith("labels 5 (camera)")
-    assert aside_words(novice().set_aside()) == ""
+    (found,) = learner.set_aside()
+    assert (found.number, found.source, found.action) == (5, "camera", (1.0, -0.9))
+    assert found.others == pytest.approx((1.0, 0.9), abs=0.1)
+    assert novice().set_aside() == []
+
+
+@pytest.mark.parametrize("mirrored", [True, False])
+def test_the_parts_of_all_labels_together_are_the_action(mirrored):
+    learner = taught(mirrored=mirrored)
+    parts = learner.explain(seen(3))
+    linear, angular = np.sum([part.share for part in parts], axis=0)
+    assert learner.act(seen(3)) == pytest.approx((linear, angular))
+    assert len(parts) == learner.stored
+    assert [max(map(abs, part.share)) for part in parts] == sorted(
+        (max(map(abs, p.share)) for p in parts), reverse=True
+    )
+    same = max(parts, key=lambda part: part.likeness)
+    assert (same.number, same.source, same.action) == (3, "human", (1.0, -1.0))
+    assert same.likeness == pytest.approx(1.0)
 
 
 def test_it_is_less_sure_where_it_has_seen_nothing_like_it():

@@ -240,3 +240,30 @@ def test_it_asks_on_unseen_layouts_only_and_only_if_it_is_told_to():
     alone = asking.method.alone("unseen")
     assert alone.propose(seen()).choice.call is Call.NONE
     assert alone.propose(seen(nearness=0.2)).choice.call is Call.FEEDBACK
+
+
+class TestPractice:
+    def scene(self, *, practice):
+        scene = Scene(PlusSettings(prefill=0, reserve_s=0.0, handover_s=0.0, practice=practice))
+        scene.warm()
+        scene.camera, scene.lidar = LEFT, RIGHT
+        scene.novice.alone = lambda _: (1.0, 0.4)
+        return scene
+
+    def test_from_its_first_examination_on_the_novice_drives_as_alone_and_learns_from_the_human_only(self):
+        scene = self.scene(practice=True)
+        proposal, _ = scene.step()
+        assert (proposal.choice.driver, proposal.choice.call) == ("novice", Call.FEEDBACK)
+        scene.method.alone("prove")
+        proposal, lesson = scene.step()
+        assert (proposal.choice.driver, proposal.choice.call, proposal.command) == ("novice", Call.NONE, (1.0, 0.4))
+        assert not lesson.stored
+        assert scene.method.policy("novice")(seen()) == (1.0, 0.4)
+        assert scene.step(human=(1.0, 0.45))[1].stored is False  # it does that alone
+        assert scene.step(human=(1.0, -1.0))[1].stored
+        assert scene.sources[-1] == "human"
+
+    def test_it_is_off_unless_it_is_asked_for(self):
+        scene = self.scene(practice=False)
+        scene.method.alone("prove")
+        assert scene.step()[0].choice.call is Call.FEEDBACK

@@ -7,6 +7,7 @@ import pytest
 from taught import FEATURES, make_novice
 
 from lira.fusion.methods.base import STAND, Call
+from lira.fusion.methods.doubt import DoubtLog
 from lira.fusion.methods.rivals.ensemble_dagger import EnsembleDagger, EnsembleDaggerSettings
 from lira.fusion.methods.rivals.gated import RobotGated, discrepancy
 from lira.fusion.methods.rivals.intervention_weighted import OWN, InterventionWeighted
@@ -104,9 +105,23 @@ def test_what_the_person_does_is_learned_whoever_wanted_it():
 )
 def test_ensemble_dagger_needs_both_rules_to_drive_and_doubt_alone_to_call(doubt, human, over, back):
     settings = EnsembleDaggerSettings(tau=0.25, chi=0.1)
-    method = EnsembleDagger(make_novice(NOVICE)[0], lambda _: doubt, settings)
+    method = EnsembleDagger(make_novice(NOVICE)[0], DoubtLog(lambda _: doubt), settings)
     assert method.hands_over(FEATURES, NOVICE) is over
     assert method.hands_back(FEATURES, NOVICE, human) is back
+
+
+def test_ensemble_daggers_doubt_may_come_to_what_it_was_when_a_hand_came_uncalled():
+    doubts = [0.4]
+    method = EnsembleDagger(make_novice(NOVICE)[0], DoubtLog(lambda _: doubts[0]), EnsembleDaggerSettings())
+    assert step(method)[1].choice.call is Call.NONE  # nobody ever came
+    step(method, FAR)
+    step(method, FAR)
+    step(method)
+    assert method.chi == 0.4
+    doubts[0] = 0.5
+    assert step(method)[1].choice.call is Call.FEEDBACK
+    step(method, FAR)  # called: that says nothing about chi
+    assert method.chi == 0.4
 
 
 def test_the_discrepancy_is_the_squared_distance():

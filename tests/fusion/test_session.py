@@ -66,6 +66,9 @@ class Mind:
 
     alone = act
 
+    def set_aside(self):
+        return []
+
 
 class Pupil:
     """A method whose novice drives, and counts what the human does."""

@@ -3,6 +3,7 @@
 import math
 from types import SimpleNamespace
 
+import msgspec
 import numpy as np
 import pytest
 
@@ -10,6 +11,7 @@ from lira.fusion.methods.base import STAND, Alone, Call, Method
 from lira.fusion.methods.shield import DRIVER, HORIZON_S, MARGINS_M, STEPS, Shield, Shielded, arcs
 from lira.fusion.methods.stop_and_ask import Doubtful
 from lira.fusion.preprocess import Features
+from lira.hal.errors import ConfigError
 from lira.hal.profile import load_profile
 
 SIM, REAL = load_profile("thesis-sim"), load_profile("rosbot2")
@@ -119,6 +121,12 @@ def test_what_it_lets_through_comes_near_nothing_and_what_it_changes_would_have(
         kept, turned = kept + (answer == action), turned + (answer != action)
     assert kept > 5
     assert turned > 5
+
+
+def test_a_robot_without_a_lidar_has_none():
+    features = msgspec.structs.replace(SIM.features, inputs=("image",))
+    with pytest.raises(ConfigError, match="no lidar"):
+        Shield(msgspec.structs.replace(SIM, features=features))
 
 
 BOX, FREE = (Features(scan=scan, image=IMAGE) for scan in (scan_of(SIM, (0.9, 0.1, 0.15)), scan_of(SIM)))

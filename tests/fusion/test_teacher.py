@@ -114,8 +114,9 @@ def test_a_danger_that_passes_before_the_hand_moves_is_left_alone(crystal):
     assert drive(teacher(crystal, delay_s=0.6), crystal, "xx.xx.xxxx") == "---------H"
 
 
-def test_a_missed_danger_is_missed_for_as_long_as_it_lasts(crystal):
-    assert drive(teacher(crystal, delay_s=0.0, missed=1.0), crystal, "xxxxxxxxxx") == "----------"
+def test_a_missed_danger_is_seen_late_and_so_a_robot_that_stands_and_asks_does_not_stand_for_ever(crystal):
+    hand = teacher(crystal, delay_s=0.0, missed=1.0, notices_s=2.0)
+    assert drive(hand, crystal, "x" * 9 + ".." + "x" * 12) == "-" * 21 + "HH"
 
 
 def test_the_delay_is_log_normal_around_its_median(crystal):

@@ -24,7 +24,7 @@ from lira.hal.messages import (
 from lira.hal.messages.codec import decode, encode, ros_type_of
 from lira.hal.messages.compression import compress
 from lira.hal.messages.ros_table import CODECS, TYPES, definition
-from lira.tools.bench.samples import DECISION, INF, MESSAGES, NAN, of_kind
+from lira.tools.bench.parts.samples import DECISION, INF, MESSAGES, NAN, of_kind
 
 SCAN = of_kind(LaserScan)[0]
 

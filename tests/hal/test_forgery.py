@@ -14,8 +14,9 @@ from lira.hal.bus.access import access_list
 from lira.hal.bus.attachment import Attachment, parse_attachment
 from lira.hal.bus.bus import Bus
 from lira.hal.bus.keys import Role
+from lira.hal.bus.reader import Received
 from lira.hal.bus.services import look_at_estop, press_estop
-from lira.hal.bus.topics import APPLIED, CMD_VEL, ESTOP_LOOK, ESTOP_PRESS, INFO, SCAN, TELEOP, commander_of, named
+from lira.hal.bus.topics import APPLIED, CMD_VEL, ESTOP_LOOK, ESTOP_PRESS, INFO, SCAN, TELEOP, named
 from lira.hal.messages import STOP, Applied, Command, LaserScan, Reason, Source, Twist
 from lira.hal.messages.codec import encode
 
@@ -122,8 +123,8 @@ def test_who_cannot_be_told_apart_does_not_drive():
 
 def test_a_name_is_the_last_part_of_a_key():
     assert named(CMD_VEL, "anna").key == "cmd_vel/by/anna"
-    assert commander_of("rosbot/cmd_vel/teleop/by/laptop-2") == "laptop-2"
-    assert commander_of("rosbot/cmd_vel") == commander_of("by/cmd_vel") == ""
+    keys = {"rosbot/cmd_vel/teleop/by/laptop-2": "laptop-2", "rosbot/cmd_vel": "", "by/cmd_vel": ""}
+    assert {key: Received(None, None, 0.0, key).commander for key in keys} == keys
 
 
 def test_each_operator_may_put_commands_in_their_own_name_alone():

@@ -10,7 +10,9 @@ from wiring import joined, new_endpoint, new_name, real_time_null, remote, serve
 
 from lira.hal.bus.attachment import Attachment
 from lira.hal.bus.boundary import Boundary
-from lira.hal.bus.bus import QUESTIONS, Bus, Reader
+from lira.hal.bus.bus import Bus
+from lira.hal.bus.questions import QUESTIONS
+from lira.hal.bus.reader import Reader
 from lira.hal.bus.topics import CMD_VEL, ESTOP, INFO
 from lira.hal.errors import BusError
 from lira.hal.messages import STOP, Bool, Command, Reason, Twist
@@ -119,7 +121,8 @@ class Untouchable(bytes):
 @pytest.mark.parametrize("payload", [encode(GO), b"garbage", Untouchable(1000)])
 def test_a_poll_ends_although_there_is_always_more(payload):
     endless, boundary = Endless(payload), Boundary()
-    reader = Reader(SimpleNamespace(closed=False), SimpleNamespace(now=endless), CMD_VEL, DEPTH, boundary)
+    connection = SimpleNamespace(declare=lambda _: SimpleNamespace(now=endless))
+    reader = Reader(connection, "t/cmd_vel", CMD_VEL, DEPTH, boundary)
     reader.poll()
     assert endless.taken == DEPTH
     assert reader.full

@@ -9,7 +9,7 @@ import pytest
 
 from lira.hal.bus.attachment import Attachment
 from lira.hal.bus.boundary import Boundary
-from lira.hal.bus.bus import Received
+from lira.hal.bus.reader import Received
 from lira.hal.bus.topics import APPLIED, SCAN
 from lira.hal.client.realtime import RealTimeLink
 from lira.hal.clock import SILENT_S

@@ -5,7 +5,7 @@ from types import SimpleNamespace
 import msgspec
 import pytest
 
-from lira.hal.bus.bus import Received
+from lira.hal.bus.reader import Received
 from lira.hal.bus.sensors import SENSORS
 from lira.hal.bus.topics import ODOM
 from lira.hal.client.sensor_reader import Sense, SensorReader

@@ -8,7 +8,8 @@ import pytest
 import zenoh
 from wiring import PROFILE, StuckRobot, joined, new_endpoint, new_name, real_time_null, remote, served, wait_for
 
-from lira.hal.bus.bus import Bus, Publisher
+from lira.hal.bus.bus import Bus
+from lira.hal.bus.publisher import Publisher
 from lira.hal.bus.topics import APPLIED, CMD_VEL, DEPTH
 from lira.hal.client.realtime import DECISION_S
 from lira.hal.client.remote import RemoteArena, RemoteRobot

@@ -12,7 +12,7 @@ from lira.hal.bus.topics import APPLIED
 from lira.hal.client.remote import RemoteRobot
 from lira.hal.messages import STOP, Command, Reason, Twist
 from lira.hal.profile import STOP_BUDGET_S
-from lira.tools.bench import null_robot
+from lira.tools.bench.parts import null_robot
 from lira.tools.launch.processes import ChildProcess
 
 DRIVER = """
@@ -35,7 +35,7 @@ def address():
 
 @pytest.fixture
 def server(address, tmp_path):
-    command = [sys.executable, "-m", "lira.tools.bench.null_robot", *address]
+    command = [sys.executable, "-m", "lira.tools.bench.parts.null_robot", *address]
     with ChildProcess("the robot", command, tmp_path / "lira.robot.log") as process:
         process.wait_ready(null_robot.READY, 30.0)
         yield process
@@ -91,7 +91,7 @@ def test_sigterm_stops_the_wheels_and_ends_the_server(address, server, bus):
 
 
 def test_a_second_server_of_the_same_name_is_refused_and_the_first_goes_on(address, server, bus):
-    again = [sys.executable, "-m", "lira.tools.bench.null_robot", address[0], new_endpoint()]
+    again = [sys.executable, "-m", "lira.tools.bench.parts.null_robot", address[0], new_endpoint()]
     done = subprocess.run(again, capture_output=True, text=True, timeout=30, check=False)
     assert done.returncode != 0
     assert "already runs" in done.stderr

@@ -3,8 +3,9 @@ import pytest
 
 from lira.robot.rplidar.points import NOTHING, Points
 from lira.sim_backend.emulators.rplidar import DENSE_MODE
-from lira.tools.bench import drivers, scan_age
-from lira.tools.bench.devices import COUNT, FIRST_MM, Journal
+from lira.tools.bench import drivers
+from lira.tools.bench.parts import scan_age
+from lira.tools.bench.parts.devices import COUNT, FIRST_MM, Journal
 
 
 def test_dense_streams_are_parsed_without_loss_for_a_small_share_of_a_core(monkeypatch):

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from lira.hal.bus.boundary import Boundary
-from lira.hal.bus.bus import Received
+from lira.hal.bus.reader import Received
 from lira.hal.errors import DeviceError
 from lira.hal.messages import STOP, Command, CompressedImage, LaserScan, Odometry, Reason, Twist
 from lira.hal.profile import load_profile

@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from refused import failure_of
 
-from lira.hal.errors import DeviceError
 from lira.hal.profile import load_profile
 from lira.robot.rplidar import protocol
 from lira.robot.rplidar.device import RPLidar
@@ -132,17 +132,18 @@ def test_an_error_is_reset_once(tmp_path):
 
 
 def test_a_broken_unit_is_refused_with_its_code(tmp_path):
-    with Bench(tmp_path / "lidar", Model(broken=True)) as bench:
-        with pytest.raises(DeviceError, match="reports error 0x8008") as refused:
-            bench.supervisor.wait_alive(5.0)
-        assert "turn freely" in refused.value.remedy
+    bench = Bench(tmp_path / "lidar", Model(broken=True))
+    refused = failure_of(bench.supervisor)
+    bench.wire.close()
+    assert "reports error 0x8008" in refused.what
+    assert "turn freely" in refused.remedy
 
 
 def test_a_unit_at_no_speed_of_an_rplidar_is_refused(tmp_path):
     bench = Bench(tmp_path / "lidar", Model(baud=9600))
     bench.unit.pwm, bench.unit.mode = 660, STANDARD_MODE  # it streams, so something is heard
-    with bench, pytest.raises(DeviceError, match="is no RPLIDAR"):
-        bench.supervisor.wait_alive(5.0)
+    assert "is no RPLIDAR" in failure_of(bench.supervisor).what
+    bench.wire.close()
 
 
 def test_garbage_and_loss_are_survived_and_counted(tmp_path):
@@ -185,12 +186,7 @@ def test_a_unit_that_falls_silent_is_lost(tmp_path):
 
 def test_what_is_missing_or_no_lidar_is_named(tmp_path):
     def failure(path):
-        supervisor = Supervisor("lidar", RPLidar(str(path), LIDAR, SETTINGS, lambda _: None).session)
-        supervisor.start()
-        with pytest.raises(DeviceError) as failed:
-            supervisor.wait_alive(10.0)
-        supervisor.close()
-        return failed.value
+        return failure_of(Supervisor("lidar", RPLidar(str(path), LIDAR, SETTINGS, lambda _: None).session))
 
     assert "there is no" in failure(tmp_path / "nothing").what
     (tmp_path / "file").write_text("")

@@ -26,15 +26,15 @@ QUIET_ROSBOT = msgspec.structs.replace(
 )
 
 
-@pytest.fixture
-def look():
+@pytest.fixture(params=["sketch", "tiny"])
+def look(request):
     """What the networks see at a pose of a world: gray levels uint8 [32, 32] and normalised ranges [bins]."""
     opened = {}
 
     def look(world, pose, profile=SIM, layout=0):
         key = (msgspec.json.encode(world), layout, profile.name)
         if key not in opened:
-            opened[key] = Sensors(profile, build(world, layout), "tiny", 0)
+            opened[key] = Sensors(profile, build(world, layout), request.param, 0)
         sensors = opened[key]
         sensors.forget()
         motion = drive.motion(*pose)

@@ -6,16 +6,16 @@ import pytest
 from lira.fusion.modalities.image import gray_image
 from lira.hal.messages import Episode
 from lira.hal.profile import load_profile
-from lira.sim_backend.foresight import sketching
+from lira.sim_backend.foresight import with_small_camera
 from lira.sim_backend.twin import Twin
 
 
 @pytest.mark.parametrize("world", ["corridor", "garden"])
-def test_a_sketch_looks_like_the_picture_it_stands_for(world):
+def test_a_small_picture_looks_like_the_one_it_stands_for(world):
     profile = load_profile("rosbot2")
     px = profile.features.image_px
     seen = []
-    for each in (profile, sketching(profile)):
+    for each in (profile, with_small_camera(profile)):
         twin = Twin(each, world, renderer="tiny")
         twin.open()
         twin.reset(Episode(start_m=1.5))
@@ -28,4 +28,4 @@ def test_a_sketch_looks_like_the_picture_it_stands_for(world):
 
 def test_a_camera_that_is_small_already_is_left_alone():
     profile = load_profile("thesis-sim")
-    assert sketching(profile) is profile
+    assert with_small_camera(profile) is profile

@@ -20,14 +20,17 @@ DEPTH = Depth(width_px=64, height_px=48, range_min_m=0.1, range_max_m=6.0)
 ROSBOT = msgspec.structs.replace(load_profile("rosbot2"), depth=DEPTH)
 
 
-@pytest.fixture
-def sensors():
+@pytest.fixture(params=["sketch", "tiny"])
+def sensors(request):
     opened = []
 
     def open_with(*boxes, profile=ROSBOT):
         opened.append(
             Sensors(
-                profile, build(World(description="", limits=Limits(finish_m=9.0, lost_m=9.0), box=boxes), 0), "tiny", 0
+                profile,
+                build(World(description="", limits=Limits(finish_m=9.0, lost_m=9.0), box=boxes), 0),
+                request.param,
+                0,
             )
         )
         return opened[-1]

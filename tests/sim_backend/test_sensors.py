@@ -10,10 +10,10 @@ from lira.hal.messages import CompressedImage
 from lira.hal.messages.compression import PICTURE_LIMIT_BYTES, fit_jpeg
 from lira.hal.profile import load_profile
 from lira.sim_backend import drive
-from lira.sim_backend.camera import projection_matrix, view_matrix
 from lira.sim_backend.layout import build
 from lira.sim_backend.lidar import beam_angles
-from lira.sim_backend.scene import Scene
+from lira.sim_backend.scenes.base import Pose, View
+from lira.sim_backend.scenes.bullet import BulletScene, projection_matrix, view_matrix
 from lira.sim_backend.sensors import Sensors
 from lira.sim_backend.world import Along, Box, Limits, Line, Piece, World
 
@@ -30,11 +30,11 @@ def floor(*boxes, line=None):
     return build(World(description="", line=line, box=boxes, limits=Limits(lost_m=9.0, finish_m=50.0)))
 
 
-@pytest.fixture
-def sensors():
+@pytest.fixture(params=["sketch", "tiny"])
+def sensors(request):
     opened = []
 
-    def make(layout, profile=SIM, renderer="tiny", seed=0):
+    def make(layout, profile=SIM, renderer=request.param, seed=0):
         opened.append(Sensors(profile, layout, renderer, seed))
         return opened[-1]
 
@@ -137,7 +137,7 @@ def test_grays_come_out_as_the_world_says(sensors):
 
 def test_the_projection_maps_the_edges_of_the_view_to_the_edges_of_the_picture():
     camera = SIM.camera
-    projection = np.array(projection_matrix(camera)).reshape(4, 4).T
+    projection = np.array(projection_matrix(View(camera, 32, 32))).reshape(4, 4).T
     corner = np.array([math.tan(camera.hfov_rad / 2), math.tan(camera.vfov_rad / 2), -1.0, 1.0])
     x, y, _, w = projection @ corner
     assert (x / w, y / w) == pytest.approx((1.0, 1.0))
@@ -145,7 +145,7 @@ def test_the_projection_maps_the_edges_of_the_view_to_the_edges_of_the_picture()
 
 def test_the_view_puts_what_is_ahead_in_the_middle():
     camera = SIM.camera
-    view = np.array(view_matrix(camera, 1.0, 2.0, 0.7)).reshape(4, 4).T
+    view = np.array(view_matrix(View(camera, 32, 32), Pose(1.0, 2.0, 0.7))).reshape(4, 4).T
     assert view[:3, :3] @ view[:3, :3].T == pytest.approx(np.eye(3), abs=1e-12)
     eye = np.array([1.0 + camera.x_m * math.cos(0.7), 2.0 + camera.x_m * math.sin(0.7), camera.z_m, 1.0])
     assert (view @ eye)[:3] == pytest.approx([0, 0, 0], abs=1e-12)
@@ -179,15 +179,15 @@ def test_camera_noise_has_its_size_and_its_seed(sensors):
     assert np.std(first[8:].astype(float)) == pytest.approx(5.0, rel=0.15)
 
 
-def test_both_renderers_show_the_same(sensors):
+def test_opengl_shows_the_same(sensors):
     layout = floor(Box(x_m=2.0, y_m=0.5, gray=90), Box(x_m=3.0, y_m=-1.0), line=ROAD)
     try:
         egl = sensors(layout, oversized(SIM), renderer="egl")
     except ConfigError as error:
         pytest.skip(str(error))
-    tiny = sensors(layout, oversized(SIM))
+    other = sensors(layout, oversized(SIM))
     for pose in ((0.0, 0.0, 0.0), (0.2, 0.23, -0.3), (1.0, -0.4, 0.5)):
-        a, b = (picture(each, *pose)[..., 0].astype(int) for each in (egl, tiny))
+        a, b = (picture(each, *pose)[..., 0].astype(int) for each in (egl, other))
         assert (np.abs(a - b) > 2).mean() < 0.002, pose
 
 
@@ -199,8 +199,8 @@ def test_left_and_right_look_alike(sensors, pose):
 
 
 def test_whichever_renderer_is_faster_is_chosen_for_large_pictures_only(sensors):
-    assert sensors(floor(), SIM, "auto").renderer == "tiny"
-    assert sensors(floor(), ROSBOT, "auto").renderer in {"tiny", "egl"}
+    assert sensors(floor(), SIM, "auto").drawer == "tiny"
+    assert sensors(floor(), ROSBOT, "auto").drawer in {"tiny", "egl"}
 
 
 def test_another_layout_shows_its_own_boxes_and_none_of_the_last(sensors):
@@ -282,7 +282,7 @@ def test_noise_and_dropout_have_their_size_and_their_seed(sensors):
 
 
 def test_every_scene_has_a_client_of_its_own():
-    one, two = Scene(floor(Box(x_m=1.0, y_m=0.0))), Scene(floor())
+    one, two = BulletScene(floor(Box(x_m=1.0, y_m=0.0))), BulletScene(floor())
     assert one.client != two.client
     one.close()
     one.close()

@@ -8,11 +8,11 @@ from concurrent.futures import ThreadPoolExecutor
 import numpy as np
 import pytest
 
-from lira.hal.errors import ConfigError, DeviceError, MissingExtraError
+from lira.hal.errors import ConfigError, DeviceError
 from lira.hal.messages import Command, CompressedImage, Episode, Image, Reason, Source, Twist
 from lira.hal.profile import load_profile
-from lira.sim_backend import scene
 from lira.sim_backend.foresight import Foresight
+from lira.sim_backend.scenes.silence import quiet
 from lira.sim_backend.twin import Twin
 
 SIM = load_profile("thesis-sim")
@@ -280,8 +280,16 @@ def test_bad_options_are_refused():
 
 def test_without_pybullet_the_remedy_is_named(monkeypatch):
     monkeypatch.setitem(sys.modules, "pybullet", None)
-    with pytest.raises(MissingExtraError, match="lira-rosbot\\[sim\\]"):
-        Twin(SIM, "line")
+    with pytest.raises(ConfigError, match="pybullet is not installed"):
+        Twin(SIM, "line", renderer="tiny")
+
+
+def test_without_pybullet_the_twin_is_a_sketch(monkeypatch, twin):
+    assert twin().renderer == "tiny"
+    monkeypatch.setitem(sys.modules, "pybullet", None)
+    robot = twin()
+    assert robot.renderer == "sketch"
+    assert robot.read().image is not None
 
 
 def test_nothing_but_reports_reaches_the_standard_output():
@@ -295,7 +303,7 @@ def test_nothing_but_reports_reaches_the_standard_output():
 
 
 def test_quiet_gives_the_streams_back_after_an_error(capfd):
-    with pytest.raises(ZeroDivisionError), scene.quiet():
+    with pytest.raises(ZeroDivisionError), quiet():
         1 / 0  # noqa: B018
     print("here")
     assert capfd.readouterr().out == "here\n"

@@ -17,7 +17,9 @@ from lira.tools.joystick.mapping import load_mapping
 PS3 = load_mapping("ps3")
 PAD_KEYS = sorted(BUTTONS[name] for name in PS3.buttons)
 PAD_AXES = (0, 1, 2, 3, 4, 5)
+HAT = (16, 17)
 SONY = "Sony PLAYSTATION(R)3 Controller"
+PS3_IDS = 0x054C, 0x0268
 ADDRESS = "00:11:22:33:44:55"
 # Mostly dense, with pauses: from these the bridge learns a patience that outlasts a test machine's own stalls.
 MOTION_S, PAUSE_S, PAUSE_EVERY = 0.005, 0.08, 10
@@ -71,15 +73,15 @@ class Bed:
         ctypes.CDLL("libgobject-2.0.so.0").g_object_unref(ctypes.c_void_p(self._bed))
         ctypes.CDLL(None).unsetenv(b"UMOCKDEV_DIR")
 
-    def plug(self, number: int, name: str = SONY, *, uniq: str = ADDRESS, keys=PAD_KEYS, motion: bool = False) -> None:
+    def plug(self, number, name=SONY, *, uniq=ADDRESS, keys=PAD_KEYS, axes=PAD_AXES, motion=False, ids=PS3_IDS) -> None:
         """A node appears. umockdev takes each number once."""
-        axes = PAD_AXES[:3] if motion else PAD_AXES
+        axes = PAD_AXES[:3] if motion else axes
         keys = [] if motion else keys
         self._lib.umockdev_testbed_add_from_string(
-            self._bed, description(number, name, uniq, keys, axes, motion).encode(), None
+            self._bed, description(number, name, uniq, keys, axes, motion, ids).encode(), None
         )
         table = self._folder / f"event{number}.ioctl"
-        table.write_text(ioctls(number, name, uniq, keys, axes, motion))
+        table.write_text(ioctls(number, name, uniq, keys, axes, motion, ids))
         assert self._lib.umockdev_testbed_load_ioctl(self._bed, None, str(table).encode(), None)
         fd = self._lib.umockdev_testbed_get_dev_fd(self._bed, f"/dev/input/event{number}".encode())
         assert fd >= 0
@@ -135,11 +137,11 @@ class Bed:
                         self._write(number, (EV_ABS, 0, 500 + value))
 
 
-def description(number, name, uniq, keys, axes, motion) -> str:
+def description(number, name, uniq, keys, axes, motion, ids) -> str:
     node = f"/devices/virtual/input/input{number}"
     attributes = {
         "name": name, "uniq": uniq, "phys": "", "properties": "40" if motion else "0",
-        "id/bustype": "0005", "id/vendor": "054c", "id/product": "0268", "id/version": "8100",
+        "id/bustype": "0005", "id/vendor": f"{ids[0]:04x}", "id/product": f"{ids[1]:04x}", "id/version": "8100",
         "capabilities/key": bitmap(keys), "capabilities/abs": bitmap(axes),
     }  # fmt: skip
     lines = "".join(f"A: {key}={value}\\n\n" for key, value in attributes.items())
@@ -150,12 +152,12 @@ def description(number, name, uniq, keys, axes, motion) -> str:
     )
 
 
-def ioctls(number, name, uniq, keys, axes, motion) -> str:
+def ioctls(number, name, uniq, keys, axes, motion, ids) -> str:
     kinds = [0, EV_ABS] if motion else [0, EV_KEY, EV_ABS]
     lines = [
         f"@DEV /dev/input/event{number}",
         "EVIOCGVERSION 0 01000100",
-        f"EVIOCGID 0 {struct.pack('<4H', 5, 0x054C, 0x0268, 0x8100).hex()}",
+        f"EVIOCGID 0 {struct.pack('<4H', 5, *ids, 0x8100).hex()}",
         f"EVIOCGNAME(0) 0 {name.encode().ljust(256, bytes(1)).hex()}",
         f"EVIOCGUNIQ(0) 0 {uniq.encode().ljust(256, bytes(1)).hex()}",
         f"EVIOCGBIT(0) 0 {bits(kinds, 4)}",
@@ -167,8 +169,9 @@ def ioctls(number, name, uniq, keys, axes, motion) -> str:
         "EVIOCGEFFECTS 0 00000000",
     ]
     for axis in axes:
-        value = 0 if axis in (2, 5) else 128
-        lines.append(f"EVIOCGABS({axis}) 0 {struct.pack('<6i', value, 0, 255, 0, 0, 0).hex()}")
+        least, most = (-1, 1) if axis in HAT else (0, 255)
+        value = 0 if axis in (*HAT, 2, 5) else 128
+        lines.append(f"EVIOCGABS({axis}) 0 {struct.pack('<6i', value, least, most, 0, 0, 0).hex()}")
     return "\n".join(lines).upper().replace("@DEV /DEV/INPUT/EVENT", "@DEV /dev/input/event") + "\n"
 
 

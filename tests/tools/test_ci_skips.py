@@ -1,42 +1,62 @@
+"""The suite judges itself: unexpected skips fail in CI, and what fails in a crowd has to pass alone."""
+
 import os
 import shutil
 import subprocess
 import sys
 from pathlib import Path
 
-import pytest
-
 CONFTEST = Path(__file__).parent.parent / "conftest.py"
-TESTS = {
-    "a test that skips": "import pytest\ndef test_it(): pytest.skip('no robot here')\n",
-    "a mark": "import pytest\n@pytest.mark.skip(reason='no robot here')\ndef test_it(): pass\n",
-    "a module": "import pytest\npytest.skip('no robot here', allow_module_level=True)\n",
+SKIPS = {
+    "test_calls.py": "import pytest\ndef test_it(): pytest.skip('no robot here')\n",
+    "test_mark.py": "import pytest\n@pytest.mark.skip(reason='no robot here')\ndef test_it(): pass\n",
+    "test_module.py": "import pytest\npytest.skip('no robot here', allow_module_level=True)\n",
 }
+FAILS = "def test_it(): assert False\n"
+ALONE = "import pytest\n@pytest.mark.alone\ndef test_alone(): pass\n"
+OF_PROCESSES = "import subprocess\n"
 
 
-def run_pytest(folder, *, ci):
+def run_pytest(folder, *words, ci=False):
+    for name in ("kinds.py", "loopback.py"):
+        shutil.copy(CONFTEST.with_name(name), folder)
     environment = {name: value for name, value in os.environ.items() if name != "CI"} | ({"CI": "true"} if ci else {})
     return subprocess.run(
-        [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", str(folder)],
+        [sys.executable, "-m", "pytest", "-q", "-W", "ignore", "--rootdir", str(folder), *words, str(folder)],
         check=False, capture_output=True, text=True, timeout=60, env=environment, cwd=folder,
     )  # fmt: skip
 
 
-@pytest.mark.parametrize("how", TESTS)
-def test_an_unexpected_skip_fails_in_ci_and_only_there(tmp_path, how):
-    (tmp_path / "conftest.py").write_text(CONFTEST.read_text())
-    shutil.copy(CONFTEST.with_name("kinds.py"), tmp_path)
-    (tmp_path / "test_it.py").write_text(TESTS[how])
-    assert run_pytest(tmp_path, ci=False).returncode in (0, 5)
-    done = run_pytest(tmp_path, ci=True)
+def write(folder, files, conftest=""):
+    for name, text in {"conftest.py": CONFTEST.read_text() + conftest, **files}.items():
+        (folder / name).write_text(text)
+
+
+def test_an_unexpected_skip_fails_in_ci_and_only_there(tmp_path):
+    write(tmp_path, SKIPS)
+    assert run_pytest(tmp_path, ci=False).returncode == 0
+    done = run_pytest(tmp_path, "--continue-on-collection-errors", ci=True)
     assert done.returncode != 0
-    assert "no robot here" in done.stdout
+    assert done.stdout.count("skipped in CI, which has everything it needs: no robot here") >= len(SKIPS), done.stdout
+    assert "skipped" not in done.stdout.splitlines()[-1]
 
 
 def test_an_expected_skip_and_an_expected_failure_pass_in_ci(tmp_path):
-    shutil.copy(CONFTEST.with_name("kinds.py"), tmp_path)
-    (tmp_path / "conftest.py").write_text(CONFTEST.read_text() + "\n\nEXPECTED_SKIPS = {'no robot here'}\n")
     xfail = "@pytest.mark.xfail(reason='known')\ndef test_other(): assert False\n"
-    (tmp_path / "test_it.py").write_text(TESTS["a test that skips"] + xfail)
+    expected = "\n\nEXPECTED_SKIPS = {'no robot here'}\n"
+    write(tmp_path, {"test_it.py": SKIPS["test_calls.py"] + xfail}, expected)
     done = run_pytest(tmp_path, ci=True)
     assert done.returncode == 0, done.stdout
+
+
+def test_what_fails_in_a_crowd_has_to_pass_alone_if_it_starts_processes(tmp_path):
+    write(tmp_path, {"test_it.py": OF_PROCESSES + FAILS, "test_other.py": ALONE})
+    crowd = run_pytest(tmp_path, "--crowd")
+    assert (crowd.returncode, "1 failed" in crowd.stdout, "passed" in crowd.stdout) == (0, True, False), crowd.stdout
+    alone = run_pytest(tmp_path, "--alone")
+    assert (alone.returncode, "1 failed, 1 passed" in alone.stdout) == (1, True), alone.stdout
+
+
+def test_what_fails_in_a_crowd_and_starts_nothing_has_failed(tmp_path):
+    write(tmp_path, {"test_it.py": FAILS})
+    assert run_pytest(tmp_path, "--crowd").returncode == 1

@@ -6,6 +6,7 @@ import sys
 import time
 from dataclasses import replace
 
+import cv2
 import numpy as np
 import pytest
 
@@ -28,21 +29,25 @@ from lira.hal.messages import (
     Twist,
 )
 from lira.hal.profile import load_profile
-from lira.tools.bench import null_robot
+from lira.tools.bench.parts import null_robot
 from lira.tools.bench.takeover import policy
 from lira.tools.console import sound
 from lira.tools.console.keyboard import keyboard_mapping, pad_of
-from lira.tools.console.listen import Ears, decode_picture
-from lira.tools.console.state import View, battery_share, driver_words, operator_words
+from lira.tools.console.picture import pixels_of
 from lira.tools.joystick.axes import action_of
 from lira.tools.joystick.client import TeleopClient
 from lira.tools.launch.processes import ChildProcess, free_port, lira_command
+from lira.tools.operator.listen import Ears
+from lira.tools.operator.situation import URGENCY, Situation, Urgency
+from lira.tools.operator.tones import TONES
+from lira.tools.operator.view import View
+from lira.tools.operator.voice import Voice, verdict, vocabulary
 
 os.environ["SDL_VIDEODRIVER"] = os.environ["SDL_AUDIODRIVER"] = "dummy"
 
 pygame = pytest.importorskip("pygame", reason="needs pygame: pip install 'lira-rosbot[console]'")
-from lira.tools.console.draw import BANNER, SIZE, draw, fan  # noqa: E402
-from lira.tools.console.palette import AMBER, GREEN, RED, SKY  # noqa: E402
+from lira.tools.console.draw import BANNER, SIGNS, SIZE, draw, draw_voice, fan  # noqa: E402
+from lira.tools.console.palette import AMBER, GREEN, PANEL, RED, SKY  # noqa: E402
 from lira.tools.console.window import Keyboard  # noqa: E402
 
 SCAN = LaserScan(1.0, -math.pi / 2, math.pi / 4, 0.1, 4.0, np.array([1.0, math.inf, 2.0, math.nan, 1.0], np.float32))
@@ -52,9 +57,17 @@ DECISION = Decision(
 )
 APPLIED_NOW = Applied(Twist(0.4, 0.2), 1.0, Source.POLICY, Reason.OK)
 VIEW = View(
-    "rosbot", SCAN, 0.1, np.full((32, 32, 3), 200, np.uint8), 0.1, None, APPLIED_NOW, 0.02, DECISION, 0.1,
-    BatteryState(1.0, 11.4),
-)  # fmt: skip
+    "rosbot",
+    scan=SCAN,
+    scan_age_s=0.1,
+    picture=CompressedImage(1.0, cv2.imencode(".png", np.full((32, 32, 3), 200, np.uint8))[1].tobytes()),
+    picture_age_s=0.1,
+    applied=APPLIED_NOW,
+    link_age_s=0.02,
+    decision=DECISION,
+    decision_age_s=0.1,
+    battery=BatteryState(1.0, 11.4),
+)
 
 
 def picture(view):
@@ -76,17 +89,47 @@ def feedback(view):
     return replace(view, decision=replace(view.decision, call="feedback", driver="novice"))
 
 
-@pytest.mark.parametrize(
-    ("view", "colour", "others"), [(VIEW, AMBER, RED), (feedback(VIEW), RED, AMBER)], ids=["attention", "feedback"]
-)
-def test_a_call_fills_the_banner_with_its_colour(view, colour, others):
+STOPPED = replace(VIEW, estop=True)
+LOUD = {"attention": (VIEW, AMBER), "feedback": (feedback(VIEW), SKY), "emergency stop": (STOPPED, RED)}
+
+
+@pytest.mark.parametrize("name", LOUD)
+def test_what_needs_a_person_fills_the_banner_with_its_colour(name):
+    view, colour = LOUD[name]
     banner = part(picture(view), BANNER)
     assert share_of(banner, colour) > 0.6
-    assert share_of(banner, others) == 0.0
+    assert all(share_of(banner, other) == 0.0 for _, other in LOUD.values() if other != colour)
+
+
+def test_letters_can_be_read_on_every_colour():
+    for colour, ink, corners in SIGNS.values():
+        assert contrast(ink, colour if corners else PANEL) >= 4.5
+
+
+def contrast(first, second):
+    """The ratio that WCAG 2 defines."""
+
+    def luminance(colour):
+        linear = [c / 12.92 if c <= 0.04045 else ((c + 0.055) / 1.055) ** 2.4 for c in np.array(colour) / 255.0]
+        return float(np.dot(linear, (0.2126, 0.7152, 0.0722)))
+
+    low, high = sorted((luminance(first), luminance(second)))
+    return (high + 0.05) / (low + 0.05)
+
+
+@pytest.mark.parametrize("situation", Situation)
+def test_all_words_fit_into_the_banner(situation):
+    words = vocabulary("en")[situation]
+    surface = pygame.Surface(SIZE)
+    surface.fill((1, 2, 3))
+    draw_voice(surface, BANNER, Voice(situation, URGENCY[situation], words.who, words.why, words.now))
+    pixels = pygame.surfarray.array3d(surface)
+    pixels[BANNER.x : BANNER.right, BANNER.y : BANNER.bottom] = (1, 2, 3)
+    assert share_of(pixels, (1, 2, 3)) == 1.0
 
 
 def test_calls_are_told_apart_without_colour():
-    gray = [part(picture(view), BANNER).mean(axis=-1) for view in (VIEW, feedback(VIEW))]
+    gray = [part(picture(view), BANNER).mean(axis=-1) for view in (VIEW, STOPPED)]
     shape = [np.abs(g - np.median(g)) > 60 for g in gray]
     left = slice(20, 90)
     assert np.mean(shape[0][left] != shape[1][left]) > 0.05
@@ -114,7 +157,7 @@ def test_only_what_changed_changes_on_the_screen():
 def test_a_stale_picture_is_not_shown():
     box = pygame.Rect(16, 40, 528, 300)
     assert share_of(part(picture(VIEW), box), (200, 200, 200)) > 0.3
-    assert share_of(part(picture(replace(VIEW, camera_age_s=2.0)), box), (200, 200, 200)) == 0.0
+    assert share_of(part(picture(replace(VIEW, picture_age_s=2.0)), box), (200, 200, 200)) == 0.0
 
 
 def test_actions_of_an_old_decision_are_not_shown_and_its_counts_are():
@@ -135,62 +178,16 @@ def test_the_fan_has_left_on_the_left_and_drops_what_is_invalid():
     assert [share for _, share in fan(SCAN, 1.0, 4.0, (100, 100), 80.0)] == [0.5]
 
 
-@pytest.mark.parametrize(
-    ("view", "words"),
-    [
-        (VIEW, "EXPERT CAMERA"),
-        (feedback(VIEW), "NOVICE"),
-        (replace(VIEW, estop=True), "EMERGENCY STOP"),
-        (replace(VIEW, link_age_s=3.0), "NO LINK"),
-        (View("rosbot"), "NO LINK"),
-        (replace(VIEW, applied=replace(APPLIED_NOW, source=Source.TELEOP)), "HUMAN"),
-        (replace(VIEW, applied=Applied(STOP, 1.0, Source.NONE, Reason.STALE)), "STANDS"),
-        (replace(VIEW, decision=replace(DECISION, driver="mean")), "EXPERTS' MEAN"),
-        (replace(VIEW, decision=None), "POLICY"),
-        (replace(VIEW, decision_age_s=2.0), "POLICY"),
-    ],
+PAUSED = replace(
+    VIEW, answer=OperatorAnswer(1.0, paused=True, count=2, words="paused"), answer_age_s=0.1, verdict_age_s=0.1
 )
-def test_who_drives_is_said(view, words):
-    assert driver_words(view)[0] == words
-
-
-def test_who_commands_is_named_and_a_confirmed_stop_says_so():
-    named = replace(VIEW, applied=replace(APPLIED_NOW, source=Source.TELEOP, commander="laptop-2"))
-    assert driver_words(named) == ("HUMAN", "laptop-2 drives: the dead-man is held")
-    assert driver_words(replace(VIEW, applied=replace(APPLIED_NOW, commander="anna")))[1].startswith("anna drives: ")
-    assert not driver_words(replace(VIEW, estop=True))[1].startswith("confirmed")
-    assert driver_words(replace(VIEW, estop=True, confirmed=True))[1].startswith("confirmed by the robot; ")
-
-
-PAUSED = replace(VIEW, answer=OperatorAnswer(1.0, paused=True, count=2, words="paused"), answer_age_s=0.1)
-
-
-def test_a_pause_is_shown_until_nobody_says_so_any_more():
-    assert driver_words(PAUSED)[0] == "PAUSED"
-    assert driver_words(replace(PAUSED, estop=True))[0] == "EMERGENCY STOP"
-    by_hand = replace(PAUSED, applied=replace(APPLIED_NOW, source=Source.TELEOP))
-    assert driver_words(by_hand) == ("HUMAN", "the dead-man is held; paused: nothing is learned")
-    assert driver_words(replace(PAUSED, answer_age_s=9.0))[0] == "EXPERT CAMERA"
 
 
 def test_an_answer_is_shown_with_its_verdict():
     refused = replace(PAUSED, answer=replace(PAUSED.answer, accepted=False))
-    assert operator_words(VIEW) == ("nobody takes requests: start lira fusion", None)
-    assert operator_words(replace(VIEW, answer=OperatorAnswer(1.0), answer_age_s=0.1))[1] is None
-    assert (operator_words(PAUSED), operator_words(refused)) == (("paused", True), ("paused", False))
     edge = pygame.Rect(560, 570, 9, 42)
     colours = [share_of(part(picture(view), edge), colour) for view, colour in ((PAUSED, GREEN), (refused, RED))]
     assert min(colours) > 0.9
-
-
-def test_every_reason_has_words():
-    for reason in Reason:
-        view = replace(VIEW, applied=Applied(STOP, 1.0, Source.NONE, reason))
-        assert " " in driver_words(view)[1]
-
-
-def test_the_battery_is_between_empty_and_full():
-    assert [battery_share(BatteryState(0.0, volts)) for volts in (5.0, 11.4, 13.0)] == pytest.approx([0.0, 0.5, 1.0])
 
 
 def test_the_keyboard_is_a_pad():
@@ -203,16 +200,16 @@ def test_the_keyboard_is_a_pad():
     assert pad_of({"f1"}).holds(mapping.release)
 
 
-def test_the_two_calls_sound_different():
-    heard = {call: np.frombuffer(sound.samples(tones), np.int16) for call, tones in sound.CALLS.items()}
-    attention, asked = heard["attention"], heard["feedback"]
-    assert len(asked) > 2 * len(attention)
-    pitches = [np.argmax(np.abs(np.fft.rfft(s[:3000]))) * sound.RATE_HZ / 3000 for s in (attention, asked)]
-    assert pitches == pytest.approx([880, 523], abs=15)
+def test_what_needs_a_person_sounds_different():
+    heard = {urgency: np.frombuffer(sound.samples(tones), np.int16) for urgency, tones in TONES.items()}
+    assert set(heard) == {Urgency.WATCH, Urgency.ASK, Urgency.NEED, Urgency.ALARM}
+    assert len(heard[Urgency.ASK]) > 2 * len(heard[Urgency.WATCH])
+    pitches = [np.argmax(np.abs(np.fft.rfft(s[:3000]))) * sound.RATE_HZ / 3000 for s in heard.values()]
+    assert pitches == pytest.approx([880, 523, 262, 988], abs=15)
 
 
 def test_a_truncated_picture_is_none():
-    assert decode_picture(CompressedImage(0.0, b"\xff\xd8 no picture")) is None
+    assert pixels_of(CompressedImage(0.0, b"\xff\xd8 no picture")) is None
 
 
 SLOW = """
@@ -228,7 +225,7 @@ sys.exit(main(sys.argv[1:]))
 @contextlib.contextmanager
 def null_robot_on_the_bus(tmp_path):
     name, endpoint = f"console{os.getpid()}", f"127.0.0.1:{free_port()}"
-    robot = [sys.executable, "-m", "lira.tools.bench.null_robot", name, endpoint]
+    robot = [sys.executable, "-m", "lira.tools.bench.parts.null_robot", name, endpoint]
     with ChildProcess("the robot", robot, tmp_path / "lira.robot.log") as server:
         server.wait_ready(null_robot.READY, 30.0)
         yield name, endpoint
@@ -306,16 +303,16 @@ def test_the_keys_ask_and_say_that_nobody_answers(tmp_path):
         press("", lambda: keyboard.state == "ready" and client.known and listened.matching)
         press("p", lambda: heard == [OperatorRequest(Request.PAUSE)])
         press("", lambda: keyboard.unanswered is Request.PAUSE)
-        assert operator_words(view()) == ("nobody answers to 'pause': does lira fusion run?", False)
+        assert verdict(view()) == ("nobody answers to 'pause': does lira fusion run?", False)
         answers.put(OperatorAnswer(0.0, paused=True, count=1, words="paused"), 0.0)
-        press("", lambda: operator_words(view()) == ("paused", True))
+        press("", lambda: verdict(view()) == ("paused", True))
         press("p", lambda: heard[1:] == [OperatorRequest(Request.RESUME)])
         press("r", lambda: heard[2:] == [OperatorRequest(Request.RESET)])
 
 
 def test_the_keyboard_drives_locks_without_the_focus_and_comes_back(tmp_path):
     name, endpoint = f"keys{os.getpid()}", f"127.0.0.1:{free_port()}"
-    robot = [sys.executable, "-m", "lira.tools.bench.null_robot", name, endpoint]
+    robot = [sys.executable, "-m", "lira.tools.bench.parts.null_robot", name, endpoint]
     with contextlib.ExitStack() as stack:
         server = stack.enter_context(ChildProcess("the robot", robot, tmp_path / "lira.robot.log"))
         server.wait_ready(null_robot.READY, 30.0)

@@ -50,19 +50,15 @@ def test_a_policy_that_hits_a_box_has_failed(lira, tmp_path):
     assert all("failed" in line and "collisions 1" in line for line in lines)
 
 
+def test_behind_a_shield_it_hits_none_and_how_often_that_was_so_is_told(lira, tmp_path):
+    _, lines = lira(write_world(tmp_path), *EXAM, "--shield")
+    assert len(lines) == 2
+    assert all("collisions 0" in line and "turns changed by the shield" in line for line in lines)
+
+
 def test_a_scripted_lesson_is_told_lap_by_lap(lira, tmp_path):
-    words = (
-        "fusion",
-        "--method",
-        "hg-dagger",
-        "--teacher",
-        "perfect",
-        "--train-laps",
-        "1",
-        "--run",
-        str(tmp_path / "run"),
-    )
-    _, lines = lira(write_world(tmp_path), *words)
+    words = ("--method", "hg-dagger", "--teacher", "perfect", "--train-laps", "1", "--run", str(tmp_path / "run"))
+    _, lines = lira(write_world(tmp_path), "fusion", *words)
     assert lines[0].startswith("hg-dagger (hg-dagger) on ")
     assert [line.split()[0] for line in lines[1:3]] == ["training", "proving"]
     assert any(line.startswith("saved ") and "the novice after" in line for line in lines)

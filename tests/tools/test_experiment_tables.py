@@ -10,15 +10,16 @@ from made_up_outcomes import HOLD, lap, outcome
 from lira.fusion.log.counts import Account
 from lira.hal.errors import StorageError
 from lira.tools.cli import main
-from lira.tools.experiments import document, methods
+from lira.tools.experiments import methods
 from lira.tools.experiments.experiment import Finding, Picture
 from lira.tools.experiments.measures import driving_row, effort_row, label_row, source_rows
-from lira.tools.experiments.page import write_page
+from lira.tools.experiments.output import document
+from lira.tools.experiments.output.page import write_page
+from lira.tools.experiments.output.summary import read_summaries, read_summary, summarise, to_json
 from lira.tools.experiments.registry import REGISTRY, load
+from lira.tools.experiments.selection import chosen_methods
 from lira.tools.experiments.studies import compare, densities, faults, sharing, thresholds, trajectories
-from lira.tools.experiments.summary import read_summary, summarise, to_json
 from lira.tools.experiments.trial import Trial
-from lira.tools.verbs.experiment import chosen_methods
 
 
 def test_labels_of_a_group_in_the_columns_of_table_2():
@@ -245,11 +246,18 @@ def test_results_are_written_from_the_summaries_that_are_there(tmp_path, capsys)
     assert "holds no summary" in capsys.readouterr().err
     (tmp_path / "race.json").write_text(to_json(summarise("race", "words", "command", 4, load("race"), compared(3))))
     assert main(["experiment", "results", *where]) == 0
-    text = out.read_text()
     half = 2 * len(compare.LIRA)  # fewer labels and fewer interventions agree, how many fewer does not
-    assert f"| [race](#race) | words | 4 | {half} | {half} |" in text
+    assert f"| [race](docs/results/race.md) | words | 4 | {half} | {half} |" in out.read_text()
+    assert f"| [race](race.md) | words | 4 | {half} | {half} |" in (tmp_path / document.PAGES / "index.md").read_text()
+    text = (tmp_path / document.PAGES / "race.md").read_text()
     assert f"| {HOLD} | hg-dagger | human_labels | 3 | 3 | 3 | 4 | 0 |" in text
     assert text.count("**agrees**") == half
+
+
+def test_the_documents_in_the_repository_are_those_of_the_summaries_in_it():
+    summaries = read_summaries(document.SUMMARIES, list(REGISTRY))
+    for path, text in document.documents(summaries, document.read_causes()).items():
+        assert (document.DOCUMENT.parent / path).read_text() == text, f"{path}: run lira experiment results"
 
 
 def test_every_cause_of_the_project_explains_an_experiment():

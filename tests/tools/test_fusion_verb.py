@@ -212,7 +212,6 @@ def test_the_demo_names_a_folder_that_cannot_be_made(refused, tmp_path):
         ("torch", "learn", ["fusion", "--method", "plus"]),
         ("safetensors", "drive", ["drive", "camera-expert"]),
         ("torch", "learn", ["demo"]),
-        ("pybullet", "sim", ["demo"]),
     ],
 )
 def test_a_missing_extra_says_what_to_install(package, extra, words, tmp_path):

@@ -1,16 +1,21 @@
+import ctypes
+import os
 import subprocess
 import sys
 
 import pytest
 
 from lira.hal.errors import DeviceError
-from lira.tools.joystick.axes import AxisRange, PadState
+from lira.tools.joystick.axes import AxisRange, PadEvent, PadState
+from lira.tools.joystick.event_device import EVENT, EventDevice
+from lira.tools.joystick.finder import choose
 from lira.tools.joystick.mapping import load_mapping
-from lira.tools.joystick.nodes import Node, choose, fits, is_any_pad, motion_of, parse_bitmap, read_nodes
+from lira.tools.joystick.nodes import Node, is_any_pad, motion_of, parse_bitmap, read_nodes
 from lira.tools.joystick.pad_detect import moved_axis, pressed_button
+from lira.tools.joystick.rumble_motor import Motor
 
 PS3 = load_mapping("ps3")
-KEYS = frozenset(range(304, 319))
+KEYS = frozenset({*range(304, 319), *range(544, 548)} - {306, 309})
 
 
 def node(number, name="pad", *, buttons=KEYS, axes=frozenset(range(6)), uniq="1", motion=False):
@@ -44,9 +49,10 @@ def test_bitmaps_are_read_highest_word_first():
 
 def test_a_pad_is_known_by_its_controls_not_by_its_name():
     nodes = [KEYBOARD, MOTION, node(5, "anything"), node(6, "pad")]
-    assert choose(nodes, PS3).path == "/dev/input/event5"
-    assert not fits(node(7, axes=frozenset([0])), PS3)
-    assert choose([KEYBOARD, MOTION], PS3) is None
+    assert choose(nodes, PS3)[0].path == "/dev/input/event5"
+    assert choose(nodes)[1].name == "PS3"
+    assert choose([node(7, axes=frozenset([0]))], PS3) is None
+    assert choose([KEYBOARD, MOTION], PS3) is choose([KEYBOARD, MOTION]) is None
     assert [is_any_pad(n) for n in nodes] == [False, False, True, True]
 
 
@@ -59,10 +65,14 @@ def test_motion_sensors_belong_to_the_pad_with_the_same_address():
 def test_a_given_device_is_taken_through_a_link_and_refused_if_it_is_no_pad(tmp_path):
     link = tmp_path / "by-id"
     link.symlink_to("/dev/input/event6")
-    assert choose([node(5), node(6)], PS3, str(link)).path == "/dev/input/event6"
+    assert choose([node(5), node(6)], PS3, str(link))[0].path == "/dev/input/event6"
     assert choose([node(5)], PS3, "/dev/input/event9") is None
-    with pytest.raises(DeviceError, match="does not have the controls"):
-        choose([MOTION], PS3, MOTION.path)
+    for given in (PS3, None):
+        with pytest.raises(DeviceError, match="pad Motion Sensors"):
+            choose([MOTION], given, MOTION.path)
+    (tmp_path / "js0").touch()
+    with pytest.raises(DeviceError, match="is no event device"):
+        choose([node(5)], None, str(tmp_path / "js0"))
 
 
 def test_a_node_that_goes_away_while_it_is_read_is_left_out(tmp_path):
@@ -76,6 +86,10 @@ def test_learning_takes_the_control_that_moved_and_its_direction():
     up = PadState(ranges, {0: 140, 1: 0, 2: 0}, frozenset([311, 310]))
     axis = moved_axis(rest, up)
     assert (axis.axis, axis.inverted) == ("ABS_Y", True)
+    trigger = PadState(ranges, {0: 128, 1: 130, 2: 255}, frozenset([311]))
+    assert pressed_button(rest, trigger) == "ABS_Z+"
+    assert pressed_button(rest, trigger, frozenset(["ABS_Z"])) is None
+    assert pressed_button(rest, up, frozenset(["ABS_Y"])) == "BTN_TL"
     assert moved_axis(rest, PadState(ranges, {0: 160, 1: 130, 2: 0})) is None
     trigger = moved_axis(rest, PadState(ranges, {0: 128, 1: 130, 2: 255}))
     assert (trigger.axis, trigger.inverted) == ("ABS_Z", False)
@@ -89,31 +103,26 @@ class Motors:
     def __init__(self, *, gone=False):
         self.effects, self.running, self.gone, self.levels = set(), set(), gone, []
 
-    def capabilities(self):
-        return {21: [80]}
-
-    def upload_effect(self, effect):
+    def upload_rumble(self, level, longest_ms):
         if self.gone:
             raise OSError(19, "No such device")
-        assert 0 < effect.ff_replay.length <= 1000
-        self.levels.append(effect.u.ff_rumble_effect.strong_magnitude)
+        assert 0 < longest_ms <= 1000
+        self.levels.append(level)
         number = len(self.levels)
         self.effects.add(number)
         return number
 
-    def write(self, kind, number, value):
-        assert kind == 21
+    def play(self, number, on):
         assert number in self.effects
-        (self.running.add if value else self.running.discard)(number)
+        (self.running.add if on else self.running.discard)(number)
 
-    def erase_effect(self, number):
+    def erase(self, number):
         self.effects.remove(number)
 
 
 def test_motors_stop_for_certain_and_leave_no_effect_behind():
-    pad = pytest.importorskip("lira.tools.joystick.pad", reason="needs evdev: pip install 'lira-rosbot[joystick]'")
     device = Motors()
-    motor = pad.Motor(device)
+    motor = Motor(device)
     for strength in (1.0, 1.0, 0.5, 0.0, 0.0):
         motor.set(strength)
         assert bool(device.running) == (strength > 0.0)
@@ -122,8 +131,7 @@ def test_motors_stop_for_certain_and_leave_no_effect_behind():
 
 
 def test_a_pad_that_goes_while_it_rumbles_raises_nothing():
-    pad = pytest.importorskip("lira.tools.joystick.pad", reason="needs evdev: pip install 'lira-rosbot[joystick]'")
-    pad.Motor(Motors(gone=True)).set(1.0)
+    Motor(Motors(gone=True)).set(1.0)
 
 
 @pytest.mark.parametrize("verb", ["joystick", "console"])
@@ -137,9 +145,7 @@ def test_help_needs_neither_pygame_nor_evdev(verb):
     assert "examples:" in done.stdout
 
 
-@pytest.mark.parametrize(
-    ("verb", "package", "extra"), [("joystick", "evdev", "joystick"), ("console", "pygame", "console")]
-)
+@pytest.mark.parametrize(("verb", "package", "extra"), [("console", "pygame", "console")])
 def test_a_missing_package_is_named_before_a_robot_is_looked_for(verb, package, extra):
     code = f"import sys; sys.modules[{package!r}] = None; from lira.tools.cli import main; sys.exit(main([{verb!r}]))"
     done = subprocess.run([sys.executable, "-c", code], check=False, capture_output=True, text=True, timeout=60)
@@ -150,8 +156,9 @@ def test_a_missing_package_is_named_before_a_robot_is_looked_for(verb, package, 
     ]
 
 
-def test_the_bridge_needs_no_pygame():
-    code = "import sys; sys.modules['pygame'] = None; from lira.tools.joystick import bridge, client, pad, pad_wizard"
+def test_the_bridge_needs_no_package():
+    code = "import sys; sys.modules.update(pygame=None, evdev=None); "
+    code += "from lira.tools.joystick import bridge, client, pad, pad_wizard"
     assert subprocess.run([sys.executable, "-c", code], check=False, timeout=60).returncode == 0
 
 
@@ -160,3 +167,80 @@ def test_an_unknown_pad_is_refused_before_a_robot_is_looked_for():
     done = subprocess.run(command, check=False, capture_output=True, text=True, timeout=60)
     assert done.returncode == 2
     assert "unknown pad 'nosuch'" in done.stderr
+
+
+class Replay(ctypes.Structure):
+    _fields_ = (("length", ctypes.c_uint16), ("delay", ctypes.c_uint16))
+
+
+class Periodic(ctypes.Structure):
+    """The largest of the kernel's effects; it decides the size of all."""
+
+    _fields_ = (
+        ("waveform", ctypes.c_uint16), ("period", ctypes.c_uint16), ("magnitude", ctypes.c_int16),
+        ("offset", ctypes.c_int16), ("phase", ctypes.c_uint16), ("envelope", ctypes.c_uint16 * 4),
+        ("custom_len", ctypes.c_uint32), ("custom_data", ctypes.c_void_p),
+    )  # fmt: skip
+
+
+class RumbleEffect(ctypes.Structure):
+    _fields_ = (("strong", ctypes.c_uint16), ("weak", ctypes.c_uint16))
+
+
+class AnyEffect(ctypes.Union):
+    _fields_ = (("periodic", Periodic), ("rumble", RumbleEffect))
+
+
+class Effect(ctypes.Structure):
+    """struct ff_effect of linux/input.h."""
+
+    _fields_ = (
+        ("type", ctypes.c_uint16), ("id", ctypes.c_int16), ("direction", ctypes.c_uint16),
+        ("trigger", ctypes.c_uint16 * 2), ("replay", Replay), ("u", AnyEffect),
+    )  # fmt: skip
+
+
+def test_a_rumble_is_what_the_kernel_takes(tmp_path, monkeypatch):
+    asked = []
+
+    def ioctl(_, request, argument):
+        asked.append((request, argument))
+        if isinstance(argument, bytearray):
+            effect = Effect.from_buffer(argument)
+            assert (effect.type, effect.id, effect.replay.length, effect.replay.delay) == (0x50, -1, 800, 0)
+            assert (effect.u.rumble.strong, effect.u.rumble.weak) == (40_000, 40_000)
+            effect.id = 7
+        return 0
+
+    monkeypatch.setattr("lira.tools.joystick.event_device.fcntl.ioctl", ioctl)
+    path = tmp_path / "event5"
+    path.touch()
+    device = EventDevice(str(path))
+    assert device.upload_rumble(40_000, 800) == 7
+    device.play(7, True)
+    device.erase(7)
+    device.close()
+    (upload, effect), (erase, number) = asked
+    assert (upload, len(effect)) == (1 << 30 | ctypes.sizeof(Effect) << 16 | 0x4580, ctypes.sizeof(Effect))
+    assert (erase, number) == (0x40044581, 7)
+    *_, kind, code, value = EVENT.unpack(path.read_bytes())
+    assert (kind, code, value) == (0x15, 7, 1)
+
+
+def test_a_device_that_may_only_be_read_is_opened_for_reading(tmp_path, monkeypatch):
+    path = tmp_path / "event5"
+    path.write_bytes(EVENT.pack(0, 0, 3, 1, 200) + b"half an event")
+    real = os.open
+
+    def refuse_writing(name, flags, *more):
+        if flags & os.O_RDWR:
+            raise PermissionError(13, "Permission denied")
+        return real(name, flags, *more)
+
+    monkeypatch.setattr("lira.tools.joystick.event_device.os.open", refuse_writing)
+    device = EventDevice(str(path))
+    assert device.read() == [PadEvent(3, 1, 200)]
+    with pytest.raises(EOFError):
+        device.read()
+    device.close()
+    device.close()

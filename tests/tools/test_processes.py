@@ -1,7 +1,10 @@
+import os
 import signal
 import socket
+import subprocess
 import sys
 import time
+from pathlib import Path
 
 import pytest
 
@@ -69,6 +72,33 @@ def test_a_child_that_ignores_every_request_is_killed(tmp_path, monkeypatch):
     assert child.stop() == -signal.SIGKILL
     assert time.monotonic() - began_s < 5.0
     assert child.stop() == -signal.SIGKILL  # twice is fine
+
+
+def test_a_child_does_not_outlive_a_parent_that_is_killed(tmp_path):
+    code = f"""
+import pathlib, sys, time
+from lira.tools.launch.processes import ChildProcess
+child = ChildProcess("child", [sys.executable, "-c", {READY_THEN_SLEEP!r}], pathlib.Path({str(tmp_path / "log")!r}))
+child.wait_ready("ready", 20.0)
+print(child.pid, flush=True)
+time.sleep(60)
+"""
+    with subprocess.Popen([sys.executable, "-c", code], stdout=subprocess.PIPE, text=True) as parent:
+        pid = int(parent.stdout.readline())
+        os.kill(pid, 0)
+        parent.kill()
+    deadline_s = time.monotonic() + 10.0
+    while is_running(pid):
+        assert time.monotonic() < deadline_s
+        time.sleep(0.02)
+
+
+def is_running(pid):
+    """Whether a process is there, and no zombie that nobody has taken note of."""
+    try:
+        return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0] != "Z"
+    except OSError:
+        return False
 
 
 def test_a_free_port_can_be_bound():

@@ -1,4 +1,4 @@
-"""What a decision of three networks takes, camera, lidar and novice, beside the same networks in PyTorch. One thread."""
+"""What a decision of camera, lidar and novice takes, beside the same networks in PyTorch, all on one thread."""
 
 import statistics
 import time

@@ -17,8 +17,8 @@ from lira.robot.settings import BaseSettings
 from lira.sim_backend.emulators.core2 import Core2Unit, Firmware
 from lira.sim_backend.emulators.rplidar import Model, RplidarUnit, ScanMode
 from lira.tools.bench import Row
-from lira.tools.bench.devices import MODES
-from lira.tools.bench.scan_age import endurance, live
+from lira.tools.bench.parts.devices import MODES
+from lira.tools.bench.parts.scan_age import endurance, live
 
 RUNS = 5
 STREAM_S = 10.0

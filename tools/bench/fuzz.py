@@ -25,7 +25,7 @@ from lira.hal.profile import load_profile, profile_from_json
 from lira.sim_backend.catalogue import load_world
 from lira.sim_backend.world import World
 from lira.tools.bench import Row
-from lira.tools.bench.samples import of_kind
+from lira.tools.bench.parts.samples import of_kind
 
 INPUTS = 100_000
 SEED = 1

@@ -19,7 +19,8 @@ from lira.hal.client.remote import RemoteRobot
 from lira.hal.errors import BusError
 from lira.hal.messages import STOP, Command, LaserScan
 from lira.hal.messages.codec import encode
-from lira.tools.bench import Row, echo, null_robot
+from lira.tools.bench import Row
+from lira.tools.bench.parts import echo, null_robot
 from lira.tools.launch.processes import ChildProcess, free_port
 
 RUNS = 3
@@ -43,12 +44,12 @@ def measure() -> dict[str, float]:
     port, echo_port = free_port(), free_port()
     name, endpoint, echo_endpoint = f"bench_{port}", f"127.0.0.1:{port}", f"127.0.0.1:{echo_port}"
     python = [sys.executable, "-m"]
-    robot = [*python, "lira.tools.bench.null_robot", name, endpoint, str(SCAN_HZ)]
+    robot = [*python, "lira.tools.bench.parts.null_robot", name, endpoint, str(SCAN_HZ)]
     with (
         TemporaryDirectory() as folder,
         ChildProcess("the robot", robot, Path(folder) / "lira.robot.log") as server,
         ChildProcess(
-            "the echo", [*python, "lira.tools.bench.echo", echo_endpoint], Path(folder) / "echo.log"
+            "the echo", [*python, "lira.tools.bench.parts.echo", echo_endpoint], Path(folder) / "echo.log"
         ) as mirror,
     ):
         server.wait_ready(null_robot.READY, READY_S)

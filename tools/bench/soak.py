@@ -21,7 +21,8 @@ from lira.hal.bus.services import press_estop, release_estop
 from lira.hal.bus.topics import APPLIED, RESET
 from lira.hal.errors import ConfigError
 from lira.hal.messages import STOP, Episode, Source
-from lira.tools.bench import Row, watcher
+from lira.tools.bench import Row
+from lira.tools.bench.parts import watcher
 from lira.tools.launch.processes import ChildProcess, free_port, lira_command
 from lira.tools.stop_test.control import tell
 from lira.tools.stop_test.parts import hand

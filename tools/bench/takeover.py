@@ -18,18 +18,20 @@ from tempfile import TemporaryDirectory
 
 import numpy as np
 
-from lira.hal.bus.bus import Bus, Reader
+from lira.hal.bus.bus import Bus
+from lira.hal.bus.reader import Reader
 from lira.hal.bus.topics import APPLIED
 from lira.hal.client.remote import RemoteRobot
 from lira.hal.errors import BusError
 from lira.hal.messages import HELD, STOP, Applied, Command, Source, Twist
-from lira.tools.bench import Row, null_robot
+from lira.tools.bench import Row
+from lira.tools.bench.parts import null_robot
 from lira.tools.joystick.axes import AxisRange, PadEvent, PadState
 from lira.tools.joystick.bridge import Bridge
 from lira.tools.joystick.client import TeleopClient
 from lira.tools.joystick.codes import AXES, BUTTONS, EV_ABS, EV_KEY, EV_SYN
 from lira.tools.joystick.known_pads import PadMemory
-from lira.tools.joystick.mapping import Mapping, load_mapping
+from lira.tools.joystick.mapping import load_mapping
 from lira.tools.launch.processes import ChildProcess, free_port
 
 SAMPLES = 150
@@ -46,10 +48,12 @@ class PipePad:
 
     name = key = "a pipe"
     has_motion = False
+    motion_trouble = ""
 
     def __init__(self) -> None:
         self._read_fd, self._write_fd = os.pipe()
         self.state = PadState({0: AxisRange(), 1: AxisRange()}, {0: 128, 1: 128})
+        self.mapping = load_mapping("ps3")
 
     def send(self, *events: tuple[int, int, int]) -> None:
         """One report, as a thumb would cause it."""
@@ -82,7 +86,7 @@ def run() -> list[Row]:
     """Return one row."""
     port = free_port()
     name, endpoint = f"bench_{port}", f"127.0.0.1:{port}"
-    robot = [sys.executable, "-m", "lira.tools.bench.null_robot", name, endpoint]
+    robot = [sys.executable, "-m", "lira.tools.bench.parts.null_robot", name, endpoint]
     with TemporaryDirectory() as folder, ChildProcess("the robot", robot, Path(folder) / "lira.robot.log") as server:
         server.wait_ready(null_robot.READY, READY_S)
         taken_ms = measure(name, endpoint)
@@ -92,17 +96,17 @@ def run() -> list[Row]:
 
 def measure(name: str, endpoint: str) -> list[float]:
     """Take control from a driving policy and give it back, again and again, at moments without a rhythm."""
-    mapping, pad, rng = load_mapping("ps3"), PipePad(), random.Random(0)
+    pad, rng = PipePad(), random.Random(0)
     taken_ms: list[float] = []
     missed = 0
-    with policy(name, endpoint), bridge(name, endpoint, mapping, pad), bus_of(name, endpoint, watch=True) as bus:
+    with policy(name, endpoint), bridge(name, endpoint, pad), bus_of(name, endpoint, watch=True) as bus:
         applied = bus.reader(APPLIED, depth=64)
         while len(taken_ms) < SAMPLES + WARM_UP:
             until(applied, lambda result: result.source is Source.POLICY and result.twist != STOP)
             time.sleep(rng.uniform(0.02, 0.12))
             applied.poll()
             pressed_s = time.monotonic()
-            pad.send((EV_ABS, AXES["ABS_Y"], 0), (EV_KEY, BUTTONS[mapping.dead_man], 1))
+            pad.send((EV_ABS, AXES["ABS_Y"], 0), (EV_KEY, BUTTONS[pad.mapping.dead_man], 1))
             try:
                 arrived_s = until(applied, lambda result: result.source is Source.TELEOP and result.twist != STOP)
             except BusError:  # a busy machine stopped the robot, which now waits for a stick at rest
@@ -111,7 +115,7 @@ def measure(name: str, endpoint: str) -> list[float]:
                     raise
             else:
                 taken_ms.append(1e3 * (arrived_s - pressed_s))
-            pad.send((EV_ABS, AXES["ABS_Y"], 128), (EV_KEY, BUTTONS[mapping.dead_man], 0))
+            pad.send((EV_ABS, AXES["ABS_Y"], 128), (EV_KEY, BUTTONS[pad.mapping.dead_man], 0))
     return taken_ms[WARM_UP:]
 
 
@@ -157,13 +161,11 @@ def policy(name: str, endpoint: str) -> Iterator[None]:
 
 
 @contextmanager
-def bridge(name: str, endpoint: str, mapping: Mapping, pad: PipePad) -> Iterator[None]:
+def bridge(name: str, endpoint: str, pad: PipePad) -> Iterator[None]:
     """The bridge on that pad."""
     with bus_of(name, endpoint) as bus, bus_of(name, endpoint, watch=True) as watch:
         stop = threading.Event()
-        loop = Bridge(
-            mapping, TeleopClient(bus, watch, READY_S, lambda _: None), lambda: pad, PadMemory(None), lambda _: None
-        )
+        loop = Bridge(TeleopClient(bus, watch, READY_S, lambda _: None), lambda: pad, PadMemory(None), lambda _: None)
         with running(lambda: loop.run(stop), stop):
             yield
 

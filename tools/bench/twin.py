@@ -1,4 +1,7 @@
-"""The twin in process: how many times faster than real time, and beside pybullet's own calls for the same sensors."""
+"""The twin in process: how many times faster than real time, in each scene.
+
+With pybullet it is put beside pybullet's own calls for the same sensors; the sketch has nothing to be put beside.
+"""
 
 import statistics
 import time
@@ -10,8 +13,11 @@ import numpy as np
 
 from lira.hal.messages import Command, Episode, Observation, Twist
 from lira.hal.profile import RobotProfile, load_profile
+from lira.sim_backend.camera import PinholeCamera
 from lira.sim_backend.lidar import RayLidar
-from lira.sim_backend.sensors import open_camera
+from lira.sim_backend.scenes.base import Pose
+from lira.sim_backend.scenes.bullet import BulletScene
+from lira.sim_backend.scenes.opening import Renderer, settle
 from lira.sim_backend.twin import Twin
 from lira.tools.bench import Row
 
@@ -37,28 +43,33 @@ Call = Callable[[], object]
 
 
 def run() -> list[Row]:
-    """Return one row per profile."""
-    return [measure(load) for load in LOADS]
+    """Return a row for each profile and scene: pybullet's are left out where it is not installed."""
+    renderers: list[Renderer] = ["sketch", "auto"] if settle("auto") == "auto" else ["sketch"]
+    return [measure(load, renderer) for load in LOADS for renderer in renderers]
 
 
-def measure(load: Load) -> Row:
-    """Time runs of the twin, each followed by the bare calls from the very same poses."""
+def measure(load: Load, renderer: Renderer) -> Row:
+    """Time runs of the twin; with pybullet each is followed by the bare calls from the very same poses."""
     profile = load_profile(load.profile)
-    twin = Twin(profile, WORLD)
+    twin = Twin(profile, WORLD, renderer=renderer)
     twin.open()
     try:
+        drawer = twin.renderer
+        runs_s, ratios = [], []
         with bare_calls(profile, twin, load) as calls:
-            pairs = [(timed(lambda: drive(twin, load)), timed(lambda: make(calls))) for _ in range(RUNS)]
-        renderer = twin.renderer
+            for _ in range(RUNS):
+                runs_s.append(timed(lambda: drive(twin, load)))
+                if calls:
+                    ratios.append(runs_s[-1] / timed(lambda: make(calls)))
     finally:
         twin.close()
-    factors = [load.run_s / ours_s for ours_s, _ in pairs]
+    factors = [load.run_s / run_s for run_s in runs_s]
     return {
         "profile": load.profile,
-        "renderer": renderer,
+        "renderer": drawer,
         "image": f"{profile.camera.width_px}x{profile.camera.height_px}",
         "real_time_factor": statistics.median(factors),
-        "ratio_to_bare": statistics.median(ours_s / bare_s for ours_s, bare_s in pairs),
+        "ratio_to_bare": statistics.median(ratios) if ratios else None,
         "runs": factors,
     }
 
@@ -78,27 +89,30 @@ def drive(twin: Twin, load: Load, look: Callable[[Observation], None] | None = N
 
 @contextmanager
 def bare_calls(profile: RobotProfile, twin: Twin, load: Load) -> Iterator[list[Call]]:
-    """Everything the twin asks pybullet for in a run, ready to be called on a scene of its own."""
-    camera = open_camera(profile.camera, twin.layout, "egl" if twin.renderer == "egl" else "tiny")
-    lidar = RayLidar(profile.lidar, camera.scene, np.random.default_rng(0))
-    bullet = camera.scene.bullet
+    """Everything the twin asks pybullet for in a run, ready to be called on a scene of its own; nothing of a sketch."""
+    if twin.renderer == "sketch":
+        yield []
+        return
+    scene = BulletScene(twin.layout, egl=twin.renderer == "egl")
+    view = PinholeCamera(profile.camera, scene).view
+    lidar = RayLidar(profile.lidar, scene, np.random.default_rng(0))
     calls: list[Call] = []
 
     def remember(seen: Observation) -> None:
         state = twin.state()
-        pose = (state.x_m, state.y_m, state.yaw_rad)
+        pose = Pose(state.x_m, state.y_m, state.yaw_rad)
         if seen.image is not None and seen.image.stamp_s == state.stamp_s:
-            request = camera.request(*pose)
-            calls.append(lambda: camera.scene.photograph(request))
+            picture = scene.picture_request(view, pose)
+            calls.append(lambda: scene.shoot(picture))
         if seen.scan is not None and seen.scan.stamp_s == state.stamp_s:
-            rays = lidar.request(*pose)
-            calls.append(lambda: bullet.rayTestBatch(**rays))
+            rays = scene.ray_request(*lidar.fan(pose))
+            calls.append(lambda: scene.bullet.rayTestBatch(**rays))
 
     drive(twin, load, remember)
     try:
         yield calls
     finally:
-        camera.scene.close()
+        scene.close()
 
 
 def make(calls: list[Call]) -> None:

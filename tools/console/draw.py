@@ -5,15 +5,38 @@ import math
 import pygame
 
 from lira.hal.messages import Action, ExpertView, LaserScan
-from lira.tools.console.palette import AMBER, BACK, BLUE, DIM, EDGE, GREEN, PANEL, RED, SKY, TEXT, panel, write
-from lira.tools.console.state import LOW_V, STALE_S, View, battery_share, driver_words, operator_words
+from lira.tools.console.palette import (
+    AMBER,
+    BACK,
+    DIM,
+    EDGE,
+    GREEN,
+    INK,
+    PANEL,
+    RED,
+    SKY,
+    TEXT,
+    WHITE,
+    panel,
+    write,
+    write_lines,
+)
+from lira.tools.console.picture import pixels_of
+from lira.tools.operator.situation import Urgency
+from lira.tools.operator.view import LOW_V, STALE_S, View, battery_share
+from lira.tools.operator.voice import Voice, speak, verdict
 
 SIZE = (1280, 680)  # fits a screen of 1366 by 768 with a desktop's bar and a window's frame
-CALL_WORDS = {
-    "attention": ("ATTENTION", "one expert drives: watch it", AMBER, (0, 0, 0)),
-    "feedback": ("YOUR DECISION", "experts disagree: take control", RED, (255, 255, 255)),
+# How loud a situation is, by colour, by the colour of the letters and by shape (corners of the sign; 0: a bar alone).
+SIGNS: dict[Urgency, tuple[tuple[int, int, int], tuple[int, int, int], int]] = {
+    Urgency.IDLE: (DIM, TEXT, 0),
+    Urgency.CALM: (GREEN, TEXT, 0),
+    Urgency.WATCH: (AMBER, INK, 3),
+    Urgency.ASK: (SKY, INK, 4),
+    Urgency.NEED: (AMBER, INK, 4),
+    Urgency.ALARM: (RED, WHITE, 8),
 }
-BANNER = pygame.Rect(560, 108, 704, 84)
+BANNER = pygame.Rect(560, 16, 704, 176)
 
 
 def draw(surface: pygame.Surface, view: View) -> None:
@@ -21,8 +44,7 @@ def draw(surface: pygame.Surface, view: View) -> None:
     surface.fill(BACK)
     draw_camera(surface, pygame.Rect(16, 16, 528, 330), view)
     draw_scan(surface, pygame.Rect(16, 358, 528, 260), view)
-    draw_driver(surface, pygame.Rect(560, 16, 704, 80), view)
-    draw_call(surface, BANNER, view.call)
+    draw_voice(surface, BANNER, speak(view))
     draw_actions(surface, pygame.Rect(560, 204, 704, 246), view)
     draw_counts(surface, pygame.Rect(560, 460, 704, 94), view)
     draw_operator(surface, pygame.Rect(560, 564, 704, 54), view)
@@ -32,13 +54,14 @@ def draw(surface: pygame.Surface, view: View) -> None:
 def draw_camera(surface: pygame.Surface, box: pygame.Rect, view: View) -> None:
     """The camera's picture, as large as fits; hatched out when it is stale."""
     panel(surface, box, "camera")
-    if view.camera is None or view.camera_age_s > STALE_S:
+    pixels = None if view.picture_age_s > STALE_S else pixels_of(view.picture)
+    if pixels is None:
         write(surface, "no picture", box.center, 28, DIM, centre=True)
         return
-    height, width = view.camera.shape[:2]
+    height, width = pixels.shape[:2]
     scale = min((box.width - 16) / width, (box.height - 36) / height)
     size = (max(1, round(width * scale)), max(1, round(height * scale)))
-    picture = pygame.image.frombuffer(view.camera.tobytes(), (width, height), "RGB")
+    picture = pygame.image.frombuffer(pixels.tobytes(), (width, height), "RGB")
     picture = pygame.transform.scale(picture, size)
     surface.blit(picture, picture.get_rect(center=(box.centerx, box.centery + 10)))
 
@@ -82,32 +105,30 @@ def fan(
     return [(point, share) for _, point, share in sorted(points, reverse=True)]
 
 
-def draw_driver(surface: pygame.Surface, box: pygame.Rect, view: View) -> None:
-    """Who drives, and why."""
-    who, why = driver_words(view)
-    colour = RED if view.estop or who == "NO LINK" else BLUE if who == "HUMAN" else AMBER if view.paused else GREEN
-    pygame.draw.rect(surface, PANEL, box, border_radius=6)
-    pygame.draw.rect(surface, colour, (box.x, box.y, 10, box.height), border_radius=4)
-    write(surface, who, (box.x + 26, box.y + 10), 46, TEXT)
-    write(surface, why, (box.x + 26, box.y + 50), 26, DIM)
+def draw_voice(surface: pygame.Surface, box: pygame.Rect, voice: Voice) -> None:
+    """Who drives, why, and what to do now. What needs a person fills the box and has a sign; the rest has a bar."""
+    colour, ink, corners = SIGNS[voice.urgency]
+    pygame.draw.rect(surface, colour if corners else PANEL, box, border_radius=6)
+    left = box.x + (112 if corners else 26)
+    if corners:
+        draw_sign(surface, (box.x + 56, box.y + 62), corners, ink, colour)
+    else:
+        pygame.draw.rect(surface, colour, (box.x, box.y, 10, box.height), border_radius=4)
+    write(surface, voice.who, (left, box.y + 12), 48, ink)
+    width = box.right - 16 - left
+    y = write_lines(surface, voice.why, (left, box.y + 56), 24, ink, width)
+    write_lines(surface, voice.now, (left, y + 10), 30, ink, width)
 
 
-def draw_call(surface: pygame.Surface, box: pygame.Rect, call: str) -> None:
-    """The banner of a call: amber triangle for attention, red octagon for feedback, an empty frame for none."""
-    if call not in CALL_WORDS:
-        pygame.draw.rect(surface, EDGE, box, 1, border_radius=6)
-        write(surface, "no call", box.center, 26, DIM, centre=True)
-        return
-    word, rest, colour, ink = CALL_WORDS[call]
-    pygame.draw.rect(surface, colour, box, border_radius=6)
-    x, y = box.x + 52, box.centery
-    corners, start = (3, -math.pi / 2) if call == "attention" else (8, math.pi / 8)
+def draw_sign(
+    surface: pygame.Surface, at: tuple[int, int], corners: int, ink: tuple[int, int, int], back: tuple[int, int, int]
+) -> None:
+    """A triangle to watch, a square to act, an octagon to stop."""
+    x, y = at
+    start = {3: -math.pi / 2, 4: math.pi / 4, 8: math.pi / 8}[corners]
     angles = [start + 2 * math.pi * k / corners for k in range(corners)]
-    shape = [(x + 32 * math.cos(a), y + 32 * math.sin(a) + (6 if corners == 3 else 0)) for a in angles]
-    pygame.draw.polygon(surface, ink, shape)
-    write(surface, "!" if call == "attention" else "?", (x, y + 4), 40, colour, centre=True)
-    write(surface, word, (box.x + 104, box.y + 12), 48, ink)
-    write(surface, rest, (box.x + 104, box.y + 52), 26, ink)
+    pygame.draw.polygon(surface, ink, [(x + 36 * math.cos(a), y + 36 * math.sin(a)) for a in angles])
+    write(surface, "!", (x, y + 4), 44, back, centre=True)
 
 
 def draw_actions(surface: pygame.Surface, box: pygame.Rect, view: View) -> None:
@@ -115,7 +136,7 @@ def draw_actions(surface: pygame.Surface, box: pygame.Rect, view: View) -> None:
     panel(surface, box, "actions: turn and speed, each of the robot's limits; activation beside its threshold")
     decision = view.deciding
     if decision is None:
-        idle = "paused" if view.paused else "nobody decides: start lira fusion"
+        idle = "paused" if view.paused else "nobody decides: start lira fusion" if view.linked else "no link"
         write(surface, idle, box.center, 28, DIM, centre=True)
         return
     rows: list[tuple[str, Action, ExpertView | None]] = [(e.name, e.action, e) for e in decision.experts]
@@ -180,11 +201,11 @@ def draw_counts(surface: pygame.Surface, box: pygame.Rect, view: View) -> None:
 def draw_operator(surface: pygame.Surface, box: pygame.Rect, view: View) -> None:
     """What became of the newest request, and which keys ask."""
     pygame.draw.rect(surface, PANEL, box, border_radius=6)
-    words, accepted = operator_words(view)
+    words, accepted = verdict(view)
     colour = DIM if accepted is None else GREEN if accepted else RED
     pygame.draw.rect(surface, colour, (box.x, box.y, 10, box.height), border_radius=4)
-    verdict = "" if accepted is None else "done: " if accepted else "no: "
-    write(surface, verdict + words, (box.x + 26, box.y + 8), 24, DIM if accepted is None else TEXT)
+    prefix = "" if accepted is None else "done: " if accepted else "no: "
+    write(surface, prefix + words, (box.x + 26, box.y + 8), 24, DIM if accepted is None else TEXT)
     names = () if view.decision is None else (expert.name for expert in view.decision.experts)
     keys = ["P " + ("go on" if view.paused else "pause"), "S save", "R held: new episode"]
     keys += [f"{number} {name} drives" for number, name in enumerate(names, start=1)]
@@ -199,15 +220,15 @@ def draw_status(surface: pygame.Surface, box: pygame.Rect, view: View) -> None:
     low = view.battery is not None and view.battery.voltage_v < LOW_V
     battery = "battery ?" if view.battery is None else f"battery {view.battery.voltage_v:.1f} V"
     battery += "" if view.battery is None else f" ({100 * battery_share(view.battery):.0f} %)"
-    speed = "" if view.odom is None else f"{view.odom.linear_m_s:+.2f} m/s  {view.odom.angular_rad_s:+.2f} rad/s"
-    stop = "E-STOP PRESSED" if view.estop else "e-stop free"
-    keys = "no keyboard" if view.hand is None else f"keyboard {view.hand}: SPACE + arrows, Esc stops"
+    speed = (
+        "" if view.odom is None or late else f"{view.odom.linear_m_s:+.2f} m/s  {view.odom.angular_rad_s:+.2f} rad/s"
+    )
+    keys = "no keyboard" if view.hand is None else f"keyboard {view.hand}: SPACE + arrows, Esc stops, F1 held releases"
     parts = (
         (view.robot, TEXT),
-        (link, RED if late else TEXT),
-        (battery + (" LOW" if low else ""), RED if low else TEXT),
+        (link, AMBER if late else TEXT),
+        (battery + (" LOW" if low else ""), AMBER if low else TEXT),
         (speed, TEXT),
-        (stop, RED if view.estop else TEXT),
         (keys, DIM),
     )
     x = box.x + 14

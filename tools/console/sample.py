@@ -15,8 +15,9 @@ from lira.hal.messages import (
     Source,
     Twist,
 )
+from lira.hal.messages.compression import compress
 from lira.hal.profile import load_profile
-from lira.tools.console.state import View
+from lira.tools.operator.view import View
 
 START_M = 14.0
 
@@ -32,10 +33,11 @@ def sample_view() -> View:
     try:
         twin.reset(Episode(start_m=START_M))
         twin.wait(twin.now() + 0.3)
-        seen = twin.read()
+        seen, truth = twin.read(), twin.state()
     finally:
         twin.close()
-    pixels = seen.image.data if isinstance(seen.image, Image) else None
+    assert seen.image is not None
+    picture = compress(seen.image, "png") if isinstance(seen.image, Image) else seen.image
     experts = (
         ExpertView("camera", (0.86, 0.42), 0.161, True),
         ExpertView("lidar", (0.71, -0.65), 0.118, True),
@@ -49,9 +51,11 @@ def sample_view() -> View:
         robot="rosbot",
         scan=seen.scan,
         scan_age_s=0.05,
-        camera=None if pixels is None else (pixels if pixels.ndim == 3 else pixels[..., None].repeat(3, axis=2)),
-        camera_age_s=0.04,
+        picture=picture,
+        picture_age_s=0.04,
         odom=seen.odom,
+        truth=truth,
+        truth_age_s=0.05,
         applied=Applied(twist, seen.stamp_s, Source.POLICY, Reason.OK),
         link_age_s=0.012,
         decision=decision,
@@ -59,6 +63,7 @@ def sample_view() -> View:
         battery=BatteryState(seen.stamp_s, 11.9),
         answer=OperatorAnswer(seen.stamp_s, count=1, words="saved 139 labels and the novice after 4 training steps"),
         answer_age_s=0.1,
+        verdict_age_s=0.1,
         fov_rad=min(profile.features.fov_rad, 2 * math.pi),
         max_range_m=profile.features.max_range_m,
     )

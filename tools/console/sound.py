@@ -1,12 +1,8 @@
-"""Two sounds that are told apart without looking. Pure: samples of signed 16 bits, one channel."""
+"""Tones as samples: signed 16 bits, one channel. Pure."""
 
 import numpy as np
 
 RATE_HZ = 22050
-# Attention: one short high tone. Feedback: a falling pair, twice.
-ATTENTION = ((880.0, 0.18),)
-FEEDBACK = ((523.0, 0.18), (349.0, 0.26), (523.0, 0.18), (349.0, 0.26))
-CALLS = {"attention": ATTENTION, "feedback": FEEDBACK}
 
 
 def samples(tones: tuple[tuple[float, float], ...]) -> bytes:

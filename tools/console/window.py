@@ -13,11 +13,14 @@ from lira.hal.messages import Request
 from lira.tools.console import sound
 from lira.tools.console.draw import SIZE, draw
 from lira.tools.console.keyboard import keyboard_mapping, pad_of
-from lira.tools.console.state import View
 from lira.tools.joystick.axes import PadState
 from lira.tools.joystick.client import TeleopClient
 from lira.tools.joystick.deadman import Hand, State
 from lira.tools.joystick.requests import RequestButtons
+from lira.tools.operator.situation import Urgency
+from lira.tools.operator.tones import TONES
+from lira.tools.operator.view import View
+from lira.tools.operator.voice import speak
 
 FPS = 30.0
 KEYS = {
@@ -105,7 +108,7 @@ def show(look: Callable[[], View], keyboard: Keyboard | None, stop: threading.Ev
         screen = pygame.display.set_mode(SIZE, pygame.RESIZABLE | pygame.SCALED)
         pygame.display.set_caption("lira console")
         pressed: frozenset[str] = frozenset()
-        call, due_s = "none", time.monotonic()
+        loud, due_s = Urgency.CALM, time.monotonic()
         while not stop.is_set():
             for event in pygame.event.get():
                 if event.type == pygame.QUIT:
@@ -122,9 +125,10 @@ def show(look: Callable[[], View], keyboard: Keyboard | None, stop: threading.Ev
             view = look()
             if keyboard is not None:
                 view = replace(view, hand=keyboard.state, unanswered=keyboard.unanswered, confirmed=keyboard.confirmed)
-            if view.call != call and view.call in sounds:
-                sounds[view.call].play()
-            call = view.call
+            urgency = speak(view).urgency
+            if urgency is not loud and urgency in sounds:
+                sounds[urgency].play()
+            loud = urgency
             draw(screen, view)
             pygame.display.flip()
             due_s = max(due_s + 1.0 / FPS, time.monotonic())
@@ -133,10 +137,10 @@ def show(look: Callable[[], View], keyboard: Keyboard | None, stop: threading.Ev
         pygame.quit()
 
 
-def load_sounds() -> dict[str, pygame.mixer.Sound]:
-    """The calls' sounds; none on a machine without a loudspeaker."""
+def load_sounds() -> dict[Urgency, pygame.mixer.Sound]:
+    """What each urgency sounds like; none on a machine without a loudspeaker."""
     try:
         pygame.mixer.init(frequency=sound.RATE_HZ, size=-16, channels=1)
     except pygame.error:
         return {}
-    return {call: pygame.mixer.Sound(buffer=sound.samples(tones)) for call, tones in sound.CALLS.items()}
+    return {urgency: pygame.mixer.Sound(buffer=sound.samples(tones)) for urgency, tones in TONES.items()}

@@ -59,7 +59,8 @@ class Experiment:
 
     `trials(seeds)` lists what is run for seeds 0, 1, ... `seeds - 1`. `ratios` are rows of `method`, `against`,
     `quantity`, `median`, `low`, `high`, `n`, `censored`, for experiments that compare methods pair by pair, and
-    `quality` rows of `method`, `pair`, effort and unseen laps passed, for those that ask how good the novices are.
+    `quality` rows of `method`, `pair`, effort and unseen laps passed, for those that ask how good the novices are;
+    `curves` rows of `method`, `quantity`, `at`, `share`, `collisions_100m`, for those that say how they came to be so.
     `methods` are those of which some may be played alone, and `usual` those that are if nothing is said; none where
     only all together say something. `words` says what it shows, where the registry does not.
     """
@@ -70,6 +71,7 @@ class Experiment:
     figures: Callable[[Outcomes], list[Picture]] = lambda _: []
     ratios: Callable[[Outcomes], list[Row]] = lambda _: []
     quality: Callable[[Outcomes], list[Row]] = lambda _: []
+    curves: Callable[[Outcomes], list[Row]] = lambda _: []
     methods: tuple[str, ...] = ()
     usual: tuple[str, ...] = ()
     words: str = ""

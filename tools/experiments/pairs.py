@@ -1,6 +1,7 @@
 """Trials of one seed are pairs: ratios of what two methods, or two teachers, took, with 95 % intervals."""
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from typing import Protocol
 
 from lira.tools.experiments.experiment import Row
 from lira.tools.experiments.statistics import median_interval, paired_ratios
@@ -9,31 +10,62 @@ from lira.tools.experiments.trial import Outcome
 TOTAL = "human_labels and demonstration"
 
 
-def taken(outcome: Outcome, quantity: str) -> float:
-    """A quantity of the result by its name; `TOTAL` is every label that the human gave."""
-    result = outcome.result
-    return float(result.human_labels + result.demonstration if quantity == TOTAL else getattr(result, quantity))
+class Spent(Protocol):
+    """What teaching had taken by some time."""
+
+    @property
+    def human_labels(self) -> int:
+        """Labels of the human, after the demonstration."""
+
+    @property
+    def demonstration(self) -> int:
+        """Labels before anything was learned."""
 
 
-def ratio(numerator: Sequence[Outcome], denominator: Sequence[Outcome], quantity: str) -> Row:
-    """One quantity of the results over another's: columns `median`, `low`, `high`, `n`, `censored`.
+class Effort(Spent, Protocol):
+    """What it had taken until it had come to what was wanted."""
+
+    @property
+    def converged(self) -> bool:
+        """False for a run that met its cap: it counts with what it had used."""
+
+
+At = Callable[[Outcome], Effort]
+
+
+def in_the_end(outcome: Outcome) -> Effort:
+    """All that a trial took."""
+    return outcome.result
+
+
+def taken(effort: Spent, quantity: str) -> float:
+    """A quantity by its name; `TOTAL` is every label that the human gave."""
+    return float(effort.human_labels + effort.demonstration if quantity == TOTAL else getattr(effort, quantity))
+
+
+def ratio(numerator: Sequence[Outcome], denominator: Sequence[Outcome], quantity: str, at: At = in_the_end) -> Row:
+    """One quantity over another's: columns `median`, `low`, `high`, `n`, `censored`.
 
     Both are in the order of the same seeds. `censored` counts pairs in which either run met its cap: where that is the
     numerator's, the true ratio is larger.
     """
-    values = paired_ratios(*([taken(each, quantity) for each in group] for group in (numerator, denominator)))
+    efforts = [[at(outcome) for outcome in group] for group in (numerator, denominator)]
+    values = paired_ratios(*([taken(each, quantity) for each in group] for group in efforts))
     median, low, high = median_interval(values)
-    pairs = zip(numerator, denominator, strict=True)
-    censored = sum(not (a.result.converged and b.result.converged) for a, b in pairs)
+    censored = sum(not (a.converged and b.converged) for a, b in zip(*efforts, strict=True))
     return {"median": median, "low": low, "high": high, "n": len(values), "censored": censored}
 
 
 def ratios(
-    groups: Mapping[str, Sequence[Outcome]], names: Iterable[tuple[str, str]], quantities: Sequence[str]
+    groups: Mapping[str, Sequence[Outcome]],
+    names: Iterable[tuple[str, str]],
+    quantities: Sequence[str],
+    at: At = in_the_end,
 ) -> list[Row]:
     """Second over first for each pair of methods that were played, one row per quantity: `Experiment.ratios`."""
     return [
-        {"method": method, "against": against, "quantity": quantity} | ratio(groups[against], groups[method], quantity)
+        {"method": method, "against": against, "quantity": quantity}
+        | ratio(groups[against], groups[method], quantity, at)
         for method, against in names
         if method in groups and against in groups
         for quantity in quantities

@@ -21,7 +21,9 @@ class Entry(NamedTuple):
 
 
 REGISTRY = {
-    "unseen": Entry("what it takes to pass 11 of 12 layouts that nobody has taught: at equal quality", "unseen"),
+    "unseen": Entry(
+        "what it takes to pass 90 and 97 % of layouts that nobody has taught: curves, at equal quality", "unseen"
+    ),
     "table2": Entry("LIRA-SPF and HG-DAgger on line-obstacles (Table II)", "compare"),
     "race": Entry("the same on the 120 m race with 21 boxes (fig. 11, 12)", "compare"),
     "tableC1": Entry("activation thresholds on the figure-eight, redundancy filter off (Table C.1)", "thresholds"),
@@ -34,9 +36,9 @@ REGISTRY = {
     "trajectories": Entry("the final novices' drives on the race (fig. E.6)", "trajectories"),
     "teacher": Entry("perfect, skilled and unskilled teachers, and one fault at a time", "faults"),
     "ablation": Entry(
-        "what each part of plus is worth, with other experts and seeds than it was chosen on", "ablation"
+        "what each part of plus is worth at equal quality, with other experts than it was chosen on", "worth"
     ),
-    "variants": Entry("the experts' trunks, mirrored inputs, a stop in doubt: each against its base", "variants"),
+    "variants": Entry("the experts' trunks, mirrored inputs, a stop in doubt: each against its base", "worth"),
 }
 
 

@@ -1,6 +1,7 @@
 """One trial: one method taught on one layout by one teacher, from scratch to convergence or its cap."""
 
 import hashlib
+from collections.abc import Sequence
 from contextlib import closing
 from pathlib import Path
 
@@ -9,18 +10,21 @@ import msgspec
 from lira.fusion.experts.tasks import TASKS, task_of
 from lira.fusion.learning.trainer import InlineTrainer
 from lira.fusion.log.recorder import Journal
-from lira.fusion.log.run_log import LapRecord, ResultRecord
+from lira.fusion.log.run_log import LapRecord, Record, ResultRecord
+from lira.fusion.methods.base import Method
 from lira.fusion.methods.presets import Preset as Preset
 from lira.fusion.methods.presets import file_name
-from lira.fusion.teaching.teacher import SKILLED, TeacherSettings
+from lira.fusion.teaching.teacher import SKILLED, ScriptedTeacher, TeacherSettings
 from lira.hal.messages import Action
 from lira.hal.profile import RobotProfile, load_profile
 from lira.sim_backend.catalogue import load_world
-from lira.sim_backend.foresight import sketching
+from lira.sim_backend.foresight import with_small_camera
+from lira.sim_backend.world import World
 from lira.tools.experiments.notes import Notes, Track
+from lira.tools.experiments.quality import Judged, Point, Quality, Tape, judging, teach_to
 from lira.tools.runs.build import build_method, teacher
 from lira.tools.runs.course import Course, run_course
-from lira.tools.runs.simulated import simulate
+from lira.tools.runs.simulated import SimulatedRobot, simulate
 
 UNSEEN = 1000  # layouts from here on belong to nobody's training
 
@@ -38,6 +42,7 @@ class Trial(msgspec.Struct, frozen=True):
     unseen: int = 3
     max_linear_m_s: float | None = None  # None: as fast as the robot goes
     experts: str | None = None  # a pair, as in `fusion.expert_files`; None: those of the world's task
+    quality: Quality | None = None  # teach up to it, instead of to the method's own proof
 
     @property
     def pair(self) -> str:
@@ -73,6 +78,8 @@ class Outcome(msgspec.Struct, frozen=True):
     labels: dict[str, tuple[Action, ...]]
     tracks: tuple[Track, ...]
     fingerprint: str = ""
+    points: tuple[Point, ...] = ()
+    judged: tuple[Judged, ...] = ()
 
     def after(self, lap_number: int) -> LapRecord:
         """Totals after a training lap (the last one if there were fewer; the proving run if there was none)."""
@@ -85,8 +92,8 @@ def play(trial: Trial) -> Outcome:
 
     torch.set_num_threads(1)
     profile, world = trial.profile, load_world(trial.world)
-    notes = Notes()
     first = UNSEEN + trial.seed * trial.unseen
+    layouts = range(first, first + trial.unseen)
     course = Course(
         profile,
         world,
@@ -94,13 +101,40 @@ def play(trial: Trial) -> Outcome:
         trial.method.syllabus,
         trial.laps,
         trial.all_laps,
-        unseen=range(first, first + trial.unseen),
+        layouts if not trial.quality else (),
     )
     with (
-        simulate(world, sketching(profile), layout=trial.seed, seed=trial.seed, renderer="tiny") as robot,
+        simulate(world, with_small_camera(profile), layout=trial.seed, seed=trial.seed, renderer="sketch") as robot,
         closing(build_method(trial.method, profile, trial.seed, InlineTrainer, trial.pair)) as method,
         closing(teacher(trial.skill, profile, world, trial.seed, trial.seed)) as hand,
     ):
-        journal = Journal(keep=notes.label, write=notes.record)
-        result = run_course(robot, robot.arena, method, hand, journal, course)
+        if trial.quality is not None:
+            return _to_quality(trial, trial.quality, robot, method, hand, course, layouts)
+        notes = Notes()
+        result = run_course(robot, robot.arena, method, hand, Journal(keep=notes.label, write=notes.record), course)
     return Outcome(trial, tuple(notes.laps), result, notes.labels, notes.tracks)
+
+
+def _to_quality(
+    trial: Trial,
+    quality: Quality,
+    robot: SimulatedRobot,
+    method: Method,
+    hand: ScriptedTeacher,
+    course: Course,
+    layouts: Sequence[int],
+) -> Outcome:
+    """Teach until the novice is as good as is wanted; of the laps only the numbers are kept."""
+    tape, laps = Tape(), list[LapRecord]()
+
+    def write(record: Record) -> None:
+        tape.write(record)
+        if isinstance(record, LapRecord):
+            laps.append(record)
+
+    def answering(profile: RobotProfile, world: World) -> closing[ScriptedTeacher]:
+        return closing(teacher(trial.skill, profile, world, layouts[0], trial.seed))
+
+    judge = judging(quality, method, course.profile, course.world, layouts, answering)
+    result, points, judged = teach_to(quality, robot, method, hand, Journal(write=write), tape, course, judge)
+    return Outcome(trial, tuple(laps), result, {}, (), points=tuple(points), judged=tuple(judged))

@@ -1,5 +1,5 @@
 """The joystick bridge: a person's hand on the robot, without a screen.
 
-`codes`, `mapping`, `stick`, `hand`, `requests`, `freeze`, `rumble`, `learn`, `nodes` are pure; `pad` touches the
-device, `memory` a file, `client` the bus, `bridge` is the loop.
+`codes`, `axes`, `mapping`, `families`, `deadman`, `requests`, `freeze`, `rumble`, `pad_detect`, `nodes` are pure;
+`event_device`, `pad` and `finder` touch the device, `known_pads` a file, `client` the bus, `bridge` is the loop.
 """

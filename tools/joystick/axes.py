@@ -4,7 +4,7 @@ from dataclasses import dataclass, field, replace
 from typing import NamedTuple
 
 from lira.hal.messages import Action
-from lira.tools.joystick.codes import AXES, BUTTONS, EV_ABS, EV_KEY
+from lira.tools.joystick.codes import AXES, BUTTONS, EV_ABS, EV_KEY, HALF, axis_of
 from lira.tools.joystick.mapping import Axis, Mapping
 
 
@@ -48,9 +48,12 @@ class PadState:
             return replace(self, pressed=self.pressed | code if event.value else self.pressed - code)
         return self
 
-    def holds(self, button: str) -> bool:
-        """Whether a button is pressed."""
-        return BUTTONS[button] in self.pressed
+    def holds(self, control: str) -> bool:
+        """Whether a button is pressed, or an axis that serves as one (`codes.axis_of`) at that end."""
+        axis = axis_of(control)
+        if axis is None:
+            return BUTTONS[control] in self.pressed
+        return self.reads(axis) >= HALF if control.endswith("+") else self.reads(axis) <= -HALF
 
     def reads(self, axis: str) -> float:
         """An axis in [-1, 1]; 0 if it has said nothing."""
@@ -74,6 +77,16 @@ def action_of(pad: PadState, mapping: Mapping) -> Action:
     """What the sticks ask for, each in [-1, 1]; without turbo up to the mapping's `cruise`."""
     scale = 1.0 if pad.holds(mapping.turbo) else mapping.cruise
     return scale * _shaped(pad, mapping.forward, mapping), scale * _shaped(pad, mapping.turn, mapping)
+
+
+def unrest(pad: PadState, mapping: Mapping) -> list[str]:
+    """What keeps a pad from being at rest: which axis reads what, and whether the dead-man is held."""
+    found = [
+        f"{axis.axis} reads {pad.reads(axis.axis):+.2f} (dead zone {mapping.dead_zone:.2f})"
+        for axis in (mapping.forward, mapping.turn)
+        if abs(pad.reads(axis.axis)) > mapping.dead_zone
+    ]
+    return found + ([f"{mapping.dead_man} is held"] if pad.holds(mapping.dead_man) else [])
 
 
 def _shaped(pad: PadState, axis: Axis, mapping: Mapping) -> float:

@@ -1,25 +1,34 @@
 """The bridge's loop: read the pad, let the hand decide, send, keep time. No step of it waits for the network."""
 
+import math
 import select
 import threading
 import time
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Protocol
 
 from lira.hal.errors import DeviceError
 from lira.hal.messages import Applied, Reason
-from lira.tools.joystick.axes import PadState
+from lira.tools.joystick.axes import PadState, unrest
 from lira.tools.joystick.client import TeleopClient
 from lira.tools.joystick.deadman import Hand, Order, State
 from lira.tools.joystick.freeze import FreezeWatch
 from lira.tools.joystick.known_pads import PadMemory
-from lira.tools.joystick.mapping import Mapping
+from lira.tools.joystick.mapping import Mapping, load_mapping
 from lira.tools.joystick.requests import RequestButtons
-from lira.tools.joystick.rumble import CALLS, TAKEN, Rumble, pattern_of
+from lira.tools.joystick.rumble import PATTERNS, TAKEN, Rumble, pattern_of
+from lira.tools.operator.situation import Urgency
+from lira.tools.operator.view import View
+from lira.tools.operator.voice import speak
 
 RATE_HZ = 30.0
 SEARCH_S = 0.3
 STALL_S = 2.0 / RATE_HZ
+PATIENCE_S = 1.0  # a pad that is not at rest for so long has something that keeps it from it
+REST_REMEDY = (
+    "Let go of it. If it stays so, the stick is worn: give it a larger dead_zone in a file of its own (--learn)"
+)
 WORDS = {
     State.LOCKED: "hands off: let go of the dead-man and centre the sticks to begin",
     State.READY: "ready: hold the dead-man to drive",
@@ -35,6 +44,8 @@ class OpenPad(Protocol):
     name: str
     key: str
     state: PadState
+    mapping: Mapping
+    motion_trouble: str
 
     @property
     def has_motion(self) -> bool:
@@ -56,37 +67,45 @@ class OpenPad(Protocol):
 class Bridge:
     """Connects one pad with one robot. `find` opens the pad when it is there; `say` gets a line now and then.
 
-    `memory` keeps what is learned about each pad.
+    `memory` keeps what is learned about each pad; `advice` says what to do while there is none.
 
     Raises what `find` raises if the pad that is there cannot be opened; once running it keeps trying instead.
     """
 
     def __init__(
         self,
-        mapping: Mapping,
         client: TeleopClient,
         find: Callable[[], OpenPad | None],
         memory: PadMemory,
         say: Callable[[str], None] = print,
+        advice: Callable[[], str] = lambda: "no pad is there",
     ) -> None:
-        self._mapping = mapping
         self._client = client
         self._open_pad = find
         self._memory = memory
         self._say = say
-        self._hand = Hand(mapping)
-        self._buttons = RequestButtons(mapping)
+        self._advice = advice
+        self._use(load_mapping("ps3"))  # until there is a pad, which has its own
         self._rumble = Rumble()
         self._watch = FreezeWatch()
         self._awake_s = 0.0  # time without our own stalls: those are no silence of the pad
         self._looked_s = self._due_s = self._search_s = time.monotonic()
         self._pad: OpenPad | None = None
+        self._locked_s = self._due_s  # since when the pad is not at rest
         self._sent = Order(None)
-        self._calls = 0
+        self._view = View(client.robot)
+        self._voice = speak(self._view)
+        self._heard_s = self._decided_s = -math.inf
+        self._urgency = Urgency.CALM
         self._last_words = ""
         self._find()
         if self._pad is None:
-            self._tell("no pad is there: plug one in, or press its PS button")
+            self._tell(self._advice())
+
+    @property
+    def hand(self) -> State:
+        """How the dead-man is."""
+        return self._hand.state
 
     def run(self, stop: threading.Event) -> None:
         """Go on until `stop` is set; then let the robot stand if a hand was on the controls."""
@@ -99,6 +118,12 @@ class Bridge:
             if self._pad is not None:
                 self._remember(self._pad)
                 self._pad.close()
+
+    def _use(self, mapping: Mapping) -> None:
+        """Follow a pad of this layout from now on, from the beginning."""
+        self._mapping = mapping
+        self._hand = Hand(mapping)
+        self._buttons = RequestButtons(mapping)
 
     def _step(self) -> None:
         self._wait()
@@ -137,11 +162,15 @@ class Bridge:
         applied = self._client.listen()
         if self._pad is None and now_s >= self._search_s:
             self._search()
+        if self._hand.state is not State.LOCKED or self._pad is None:
+            self._locked_s = now_s
+        elif now_s - self._locked_s >= PATIENCE_S:
+            self._say_what_moves(self._pad.state)
         self._order(None if self._pad is None else self._pad.state, now_s, tick=True)
         if self._pad is not None and self._is_alive():
             self._client.show(*_joy(self._pad.state, self._mapping), now_s)
+        self._look(applied, now_s)
         self._feel(now_s)
-        self._explain(applied)
         self._hear(now_s)
 
     def _order(self, state: PadState | None, now_s: float, *, tick: bool = False) -> None:
@@ -181,10 +210,22 @@ class Bridge:
         self._pad = self._open_pad()
         if self._pad is None:
             return
+        if self._pad.mapping != self._mapping:
+            self._use(self._pad.mapping)
         self._watch = FreezeWatch(self._memory.timeout_s(self._pad.key))
-        self._tell(f"pad: {self._pad.name}" + (", with motion sensors" if self._pad.has_motion else ""))
-        if self._mapping.freeze and not self._pad.has_motion:
+        motion = ", with motion sensors" if self._pad.has_motion else ""
+        self._tell(f"pad: {self._pad.name}{motion}, layout {self._mapping.name}")
+        if self._pad.motion_trouble:
+            self._tell(f"{self._pad.motion_trouble} Nobody will notice if it freezes.")
+        elif self._mapping.freeze and not self._pad.has_motion:
             self._tell("its motion sensors are not there, so nobody will notice if it freezes")
+        self._tell(layout_words(self._mapping))
+
+    def _say_what_moves(self, state: PadState) -> None:
+        """Name what keeps the pad from being at rest. It drives nothing meanwhile."""
+        if held := unrest(state, self._mapping):
+            names = [words.split()[0] for words in held]
+            self._tell(f"not at rest: {', '.join(held)}. {REST_REMEDY}", key=f"not at rest: {names}")
 
     def _lose(self, why: str) -> None:
         assert self._pad is not None
@@ -209,29 +250,51 @@ class Bridge:
             self._say(f"nobody answers to '{request}': does lira fusion run?")
 
     def _feel(self, now_s: float) -> None:
-        """Rumble for what was asked on `joy/feedback`, and for the learner's calls as they begin."""
+        """Rumble for what was asked on `joy/feedback`, and for whatever needs the person as it begins."""
         for message in self._client.feedback():
             self._rumble.play(pattern_of(message), now_s)
-        for decision in self._client.decisions():
-            if decision.calls > self._calls and decision.call in CALLS:
-                self._rumble.play(CALLS[decision.call], now_s)
-            self._calls = decision.calls
+        if self._voice.urgency is not self._urgency and self._voice.urgency in PATTERNS:
+            self._rumble.play(PATTERNS[self._voice.urgency], now_s)
+        self._urgency = self._voice.urgency
         if self._pad is not None:
             self._pad.rumble(self._rumble.strength(now_s) or 0.0)
 
-    def _explain(self, applied: Applied | None) -> None:
-        """Say why the robot stands though a hand drives."""
-        if applied is None or self._hand.state is not State.DRIVING:
-            return
-        if applied.reason is Reason.NEUTRAL_FIRST:
-            self._tell("the robot waits: centre the sticks once")
-        elif applied.reason is Reason.ESTOP:
-            self._tell(f"the emergency stop is pressed: let go, then hold {self._mapping.release} to release it")
+    def _look(self, applied: Applied | None, now_s: float) -> None:
+        """Bring up to date what is known, and say what to do when that becomes something else."""
+        decisions, newest = self._client.decisions(), applied or self._view.applied
+        if applied is not None:
+            self._heard_s = now_s
+        if decisions:
+            self._decided_s = now_s
+        self._view = replace(
+            self._view,
+            applied=newest,
+            link_age_s=now_s - self._heard_s,
+            decision=decisions[-1] if decisions else self._view.decision,
+            decision_age_s=now_s - self._decided_s,
+            answer=self._client.answer,
+            answer_age_s=now_s - self._client.answered_s,
+            estop=newest is not None and newest.reason is Reason.ESTOP,
+            confirmed=self._client.confirmed,
+            hand=self._hand.state,
+        )
+        before, self._voice = self._voice, speak(self._view)
+        if self._voice.situation is not before.situation and self._voice.urgency in PATTERNS:
+            self._tell(f"{self._voice.who}: {self._voice.why} {self._voice.now}")
 
-    def _tell(self, words: str) -> None:
-        if words != self._last_words:
+    def _tell(self, words: str, key: str = "") -> None:
+        """Say something, once; what has the same `key` as what was said last is the same."""
+        if (key or words) != self._last_words:
             self._say(words)
-        self._last_words = words
+        self._last_words = key or words
+
+
+def layout_words(mapping: Mapping) -> str:
+    """Which control is what on this pad, in a line."""
+    asks = (("pause", mapping.pause), ("save", mapping.save), ("reset", mapping.reset))
+    words = [f"dead-man {mapping.dead_man}", f"turbo {mapping.turbo}", f"emergency stop {' or '.join(mapping.estop)}"]
+    words += [f"release {mapping.release}", *(f"{what} {name}" for what, name in asks if name)]
+    return "its controls: " + ", ".join(words)
 
 
 def _joy(state: PadState, mapping: Mapping) -> tuple[tuple[float, ...], tuple[int, ...]]:

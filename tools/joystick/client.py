@@ -3,6 +3,7 @@
 Commands go straight to the robot's governor, stamped on the robot's clock, and never wait for an answer.
 """
 
+import math
 import threading
 from collections.abc import Callable
 
@@ -53,7 +54,8 @@ class TeleopClient:
         self._answered = 0
         self._asked: tuple[Request, float] | None = None  # and when, until it is answered
         self.confirmed = False  # that the emergency stop holds which was pressed here: by the robot itself
-        self.paused = False
+        self.answer: OperatorAnswer | None = None
+        self.answered_s = -math.inf  # when it came
         self.experts: tuple[str, ...] = ()
         self._clock = ClockEstimate()
 
@@ -61,6 +63,16 @@ class TeleopClient:
     def known(self) -> bool:
         """Whether the robot has been heard, so that commands can be stamped on its clock."""
         return self._clock.known
+
+    @property
+    def robot(self) -> str:
+        """The robot's name."""
+        return self._bus.robot
+
+    @property
+    def paused(self) -> bool:
+        """Whether driving and learning wait for a person."""
+        return self.answer is not None and self.answer.paused
 
     def listen(self) -> Applied | None:
         """Follow the robot's clock. Returns the newest of what was applied since the last time."""
@@ -104,8 +116,9 @@ class TeleopClient:
     def answers(self) -> list[OperatorAnswer]:
         """What was answered since the last time, to whomever."""
         new = []
-        for answer in (received.message for received in self._answers.poll()):
-            self.paused = answer.paused
+        for received in self._answers.poll():
+            answer = received.message
+            self.answer, self.answered_s = answer, received.arrived_s
             if answer.count not in (0, self._answered):
                 new.append(answer)
                 self._asked = None

@@ -1,5 +1,7 @@
 """Names and numbers of a gamepad's controls, as in linux/input-event-codes.h and the kernel's gamepad.rst."""
 
+from collections.abc import Iterable
+
 EV_SYN, EV_KEY, EV_ABS = 0, 1, 3
 SYN_REPORT, SYN_DROPPED = 0, 3
 INPUT_PROP_ACCELEROMETER = 6
@@ -42,5 +44,21 @@ AXES = {
     "ABS_HAT0X": 16,
     "ABS_HAT0Y": 17,
 }
+HALF = 0.5  # of an axis's way: a hat or a trigger that goes further counts as pressed
 BUTTON_NAMES = {code: name for name, code in BUTTONS.items()}
 AXIS_NAMES = {code: name for name, code in AXES.items()}
+
+
+def axis_of(control: str) -> str | None:
+    """The axis of a control such as "ABS_HAT0Y-" or "ABS_RZ+", one end of which counts as a button; None for others."""
+    return control[:-1] if control[-1:] in ("+", "-") and control[:-1] in AXES else None
+
+
+def is_control(name: str) -> bool:
+    """Whether there is a button, or an end of an axis, of that name."""
+    return name in BUTTONS or axis_of(name) is not None
+
+
+def control_names(buttons: Iterable[int], axes: Iterable[int]) -> list[str]:
+    """Names of codes, in the order of their numbers."""
+    return [BUTTON_NAMES[code] for code in sorted(buttons)] + [AXIS_NAMES[code] for code in sorted(axes)]

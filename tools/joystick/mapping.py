@@ -8,7 +8,7 @@ from msgspec import Meta
 
 from lira.hal.config import Table, load_toml
 from lira.hal.errors import ConfigError
-from lira.tools.joystick.codes import AXES, BUTTONS
+from lira.tools.joystick.codes import AXES, BUTTONS, axis_of, is_control
 
 Share = Annotated[float, Meta(ge=0.0, le=1.0)]
 
@@ -23,6 +23,7 @@ class Axis(Table, frozen=True):
 class Mapping(Table, frozen=True):
     """One kind of pad. Controls go by their names in linux/input-event-codes.h; see `pads/ps3.toml` for what each does.
 
+    Where a button is asked for, an end of an axis will do, too: "ABS_HAT0Y-" is up on a hat, "ABS_RZ+" a trigger.
     What `pause`, `reset`, `save` and `experts` (who gets control) ask is not for every pad: they may be left out.
     `freeze` says that a live pad of this kind is never silent. `axes` and `buttons` are the order of `joy`.
     """
@@ -50,25 +51,32 @@ class Mapping(Table, frozen=True):
         asking = [name for name in (self.pause, self.reset, self.save) if name]
         used = [self.dead_man, self.turbo, *self.estop, self.release, *asking, *self.experts]
         for name in (*used, *self.buttons):
-            if name not in BUTTONS:
+            if not is_control(name):
                 raise ValueError(f"there is no button named {name}")
         for name in (self.forward.axis, self.turn.axis, *self.axes):
             if name not in AXES:
                 raise ValueError(f"there is no axis named {name}")
         if len(set(used)) < len(used):
             raise ValueError("dead_man, turbo, estop, release and what asks for something must be different buttons")
+        if {axis_of(name) for name in used} & {self.forward.axis, self.turn.axis}:
+            raise ValueError("an axis that drives cannot serve as a button")
         if self.forward.axis == self.turn.axis:
             raise ValueError("forward and turn must be different axes")
 
     @property
     def needed_buttons(self) -> frozenset[int]:
         """Codes of the buttons without which this is no pad to drive with."""
-        return frozenset(BUTTONS[name] for name in (self.dead_man, self.turbo, *self.estop, self.release))
+        return frozenset(BUTTONS[name] for name in self._needed if name in BUTTONS)
 
     @property
     def needed_axes(self) -> frozenset[int]:
         """Codes of the axes without which this is no pad to drive with."""
-        return frozenset((AXES[self.forward.axis], AXES[self.turn.axis]))
+        ends = [axis for name in self._needed if (axis := axis_of(name)) is not None]
+        return frozenset(AXES[name] for name in (self.forward.axis, self.turn.axis, *ends))
+
+    @property
+    def _needed(self) -> tuple[str, ...]:
+        return (self.dead_man, self.turbo, *self.estop, self.release)
 
 
 def known_pads() -> list[str]:

@@ -1,18 +1,17 @@
 """Which input node is a pad, from what the kernel says about every node in /sys: readable even where /dev is not."""
 
-import os
 import struct
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from lira.hal.errors import DeviceError
 from lira.tools.joystick.codes import INPUT_PROP_ACCELEROMETER
-from lira.tools.joystick.mapping import Mapping
 
 SYS_INPUT = Path("/sys/class/input")
 WORD_BITS = 8 * struct.calcsize("l")
-BUTTONS_FROM = 288  # BTN_JOYSTICK: below it are keyboards and mice
+# Of joysticks, gamepads, their d-pads and what they have beyond: keyboards, mice, touchpads and tablets have others.
+PAD_BUTTONS = frozenset((*range(288, 320), *range(544, 548), *range(704, 744)))
+FEWEST_BUTTONS = 4
 
 
 @dataclass(frozen=True, slots=True)
@@ -27,11 +26,12 @@ class Node:
     buttons: frozenset[int]
     axes: frozenset[int]
     is_motion: bool
+    effects: frozenset[int] = frozenset()
 
     @property
-    def identity(self) -> tuple[str, str, str, str]:
-        """Vendor, product, name and, where the pad has one, its own address."""
-        return self.vendor, self.product, self.name, self.uniq
+    def identity(self) -> tuple[str, ...]:
+        """Vendor, product and the pad's own address; its name if it has none: by cable it may have another."""
+        return self.vendor, self.product, self.uniq.lower() or self.name
 
     @property
     def key(self) -> str:
@@ -65,6 +65,7 @@ def _read_node(entry: Path) -> Node:
     def text(name: str) -> str:
         return (entry / "device" / name).read_text(encoding="utf-8", errors="replace").strip()
 
+    effects = entry / "device" / "capabilities" / "ff"
     return Node(
         path=f"/dev/input/{entry.name}",
         name=text("name"),
@@ -74,17 +75,13 @@ def _read_node(entry: Path) -> Node:
         buttons=parse_bitmap(text("capabilities/key")),
         axes=parse_bitmap(text("capabilities/abs")),
         is_motion=INPUT_PROP_ACCELEROMETER in parse_bitmap(text("properties")),
+        effects=parse_bitmap(text("capabilities/ff")) if effects.exists() else frozenset(),
     )
 
 
-def fits(node: Node, mapping: Mapping) -> bool:
-    """Whether a node has every control of the mapping. A pad's motion sensors are a node without buttons."""
-    return not node.is_motion and mapping.needed_buttons <= node.buttons and mapping.needed_axes <= node.axes
-
-
 def is_any_pad(node: Node) -> bool:
-    """Whether a node could be a pad of whatever layout: two axes and some buttons that are not a keyboard's."""
-    return not node.is_motion and len(node.axes) >= 2 and len([b for b in node.buttons if b >= BUTTONS_FROM]) >= 4
+    """Whether a node could be a pad of whatever layout: two axes and some buttons of a pad."""
+    return not node.is_motion and len(node.axes) >= 2 and len(node.buttons & PAD_BUTTONS) >= FEWEST_BUTTONS
 
 
 def motion_of(pad: Node, nodes: Sequence[Node]) -> Node | None:
@@ -93,20 +90,3 @@ def motion_of(pad: Node, nodes: Sequence[Node]) -> Node | None:
         if node.is_motion and (node.vendor, node.product, node.uniq) == (pad.vendor, pad.product, pad.uniq):
             return node
     return None
-
-
-def choose(nodes: Sequence[Node], mapping: Mapping, device: str | None = None) -> Node | None:
-    """The pad to use: `device` if given (links are followed), else the first that fits; None if none is there.
-
-    Raises `DeviceError` if `device` is there and is no such pad.
-    """
-    if device is None:
-        return next((node for node in nodes if fits(node, mapping)), None)
-    real = os.path.realpath(device)
-    node = next((node for node in nodes if real == os.path.realpath(node.path)), None)
-    if node is not None and not fits(node, mapping):
-        raise DeviceError(
-            f"{node} does not have the controls of the pad '{mapping.name}'",
-            "Choose another --device, or write a mapping for it: lira joystick --learn my-pad.toml",
-        )
-    return node

@@ -3,9 +3,10 @@
 from dataclasses import dataclass
 
 from lira.tools.joystick.axes import PadState
-from lira.tools.joystick.codes import AXES, AXIS_NAMES, BUTTON_NAMES, BUTTONS
+from lira.tools.joystick.codes import AXES, AXIS_NAMES, BUTTON_NAMES, BUTTONS, HALF
 from lira.tools.joystick.mapping import Axis
 
+EXPERTS = "experts"
 MOVED = 0.7  # share of an axis's way from where it rested
 
 
@@ -29,6 +30,14 @@ ASKS = (
     Ask("pause", "press the button that PAUSES driving and learning, or wait to do without", optional=True),
     Ask("save", "press the button that SAVES what was learned, or wait to do without", optional=True),
     Ask("reset", "press the button that begins a new EPISODE when held, or wait to do without", optional=True),
+    *(
+        Ask(
+            f"experts{number}",
+            f"press the button that gives control to EXPERT {number}, or wait to do without",
+            optional=True,
+        )
+        for number in range(1, 5)
+    ),
 )
 
 
@@ -41,22 +50,40 @@ def moved_axis(rest: PadState, now: PadState) -> Axis | None:
     return Axis(axis=name, inverted=ways[name] < 0.0)
 
 
-def pressed_button(rest: PadState, now: PadState) -> str | None:
-    """The button that is pressed now and was not at rest; one that we have no name for does not count."""
-    return next((BUTTON_NAMES[code] for code in sorted(now.pressed - rest.pressed) if code in BUTTON_NAMES), None)
+def pressed_button(rest: PadState, now: PadState, driving: frozenset[str] = frozenset()) -> str | None:
+    """The control that is pressed now and was not at rest: a button that has a name, or else the end of an axis.
+
+    Not that of an axis in `driving`.
+    """
+    named = [BUTTON_NAMES[code] for code in sorted(now.pressed - rest.pressed) if code in BUTTON_NAMES]
+    ends = [f"{axis}{sign}" for axis, code in AXES.items() if code in now.axes and axis not in driving for sign in "+-"]
+    moved = [end for end in ends if now.holds(end) and not rest.holds(end) and _is_far(rest, now, end[:-1])]
+    return next(iter(named + moved), None)
 
 
-def to_toml(name: str, found: dict[str, Axis | str], axes: frozenset[int], buttons: frozenset[int]) -> str:
-    """The file: what was found by key, and every control in the order of its number for `joy`."""
+def _is_far(rest: PadState, now: PadState, axis: str) -> bool:
+    return abs(now.reads(axis) - rest.reads(axis)) >= HALF
+
+
+def to_toml(
+    name: str, found: dict[str, Axis | str], axes: frozenset[int], buttons: frozenset[int], *, freeze: bool = False
+) -> str:
+    """The file: what was found by key, and every control in the order of its number for `joy`.
+
+    `freeze`: the pad has motion sensors, so that a live one is never silent.
+    """
     lines = [f"name = {_quoted(name)}"]
     for ask in ASKS:
-        if ask.key not in found:
+        if ask.key not in found or ask.key.startswith(EXPERTS):
             continue
         value = found[ask.key]
         if isinstance(value, Axis):
             lines.append(f'{ask.key} = {{ axis = "{value.axis}", inverted = {str(value.inverted).lower()} }}')
         else:
             lines.append(f'{ask.key} = ["{value}"]' if ask.key == "estop" else f'{ask.key} = "{value}"')
+    experts = [f'"{found[ask.key]}"' for ask in ASKS if ask.key.startswith(EXPERTS) and ask.key in found]
+    lines.append(f"experts = [{', '.join(experts)}]")
+    lines.append(f"freeze = {str(freeze).lower()}")
     lines.append(f"axes = [{_names(AXES, axes)}]")
     lines.append(f"buttons = [{_names(BUTTONS, buttons)}]")
     return "\n".join(lines) + "\n"

@@ -1,5 +1,6 @@
 """`lira joystick --learn`: ask for each control, watch the pad, write its file."""
 
+import os
 import select
 import time
 from pathlib import Path
@@ -7,8 +8,9 @@ from pathlib import Path
 from lira.hal.config import write_whole
 from lira.hal.errors import DeviceError, StorageError
 from lira.tools.joystick.axes import PadState
-from lira.tools.joystick.mapping import Axis
-from lira.tools.joystick.nodes import Node, is_any_pad, read_nodes
+from lira.tools.joystick.finder import NONE_THERE
+from lira.tools.joystick.mapping import Axis, load_mapping
+from lira.tools.joystick.nodes import Node, is_any_pad, motion_of, read_nodes
 from lira.tools.joystick.pad import Pad
 from lira.tools.joystick.pad_detect import ASKS, Ask, moved_axis, pressed_button, to_toml
 
@@ -20,8 +22,10 @@ def learn(path: Path, device: str | None) -> int:
     """Ask, and write the file. Raises `DeviceError` without a pad or an answer, `StorageError` for the file."""
     if path.exists():
         raise StorageError(f"{path} is already there", "Choose another file name.")
-    node = _find(device)
-    pad = Pad(node)
+    nodes = read_nodes()
+    node = _find(nodes, device)
+    has_motion = motion_of(node, nodes) is not None
+    pad = Pad(node, load_mapping("ps3"))
     print(f"{node}: leave it at rest now", flush=True)
     found: dict[str, Axis | str] = {}
     try:
@@ -37,24 +41,36 @@ def learn(path: Path, device: str | None) -> int:
             _wait_for_rest(pad, rest, answer)
     finally:
         pad.close()
-    write_whole(path, to_toml(node.name, found, node.axes, node.buttons).encode())
+    write_whole(path, to_toml(node.name, found, node.axes, node.buttons, freeze=has_motion).encode())
+    if not has_motion:
+        print("it has no motion sensors: nobody will notice if it freezes")
     print(f"written: {path}; use it with: lira joystick --pad {path}")
     return 0
 
 
-def _find(device: str | None) -> Node:
-    nodes = [node for node in read_nodes() if is_any_pad(node) and device in (None, node.path)]
-    if not nodes:
-        raise DeviceError("no pad is there", "Plug one in, or press its PS button; see /proc/bus/input/devices.")
-    return nodes[0]
+def _find(nodes: list[Node], device: str | None) -> Node:
+    """The pad to learn, through links. Raises `DeviceError` if there is none."""
+    if device is None:
+        pads = [node for node in nodes if is_any_pad(node)]
+        if not pads:
+            raise DeviceError(NONE_THERE, "See /proc/bus/input/devices for what the kernel knows.")
+        return pads[0]
+    real = os.path.realpath(device)
+    node = next((node for node in nodes if real == os.path.realpath(node.path)), None)
+    if node is None:
+        raise DeviceError(f"there is no input device {device}", "See ls -l /dev/input/by-id.")
+    if not is_any_pad(node):
+        raise DeviceError(f"{node} is no gamepad", "Give another --device; see /proc/bus/input/devices.")
+    return node
 
 
 def _answer(pad: Pad, rest: PadState, ask: Ask, taken: list[Axis | str]) -> Axis | str | None:
     names = [other.axis if isinstance(other, Axis) else other for other in taken]
+    driving = frozenset(other.axis for other in taken if isinstance(other, Axis))
     deadline_s = time.monotonic() + (OPTIONAL_S if ask.optional else ANSWER_S)
     while time.monotonic() < deadline_s:
         for state in _look(pad):
-            answer = moved_axis(rest, state) if ask.is_axis else pressed_button(rest, state)
+            answer = moved_axis(rest, state) if ask.is_axis else pressed_button(rest, state, driving)
             if answer is not None and (answer.axis if isinstance(answer, Axis) else answer) not in names:
                 return answer
     if ask.optional:

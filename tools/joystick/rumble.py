@@ -1,15 +1,18 @@
 """What calls feel like. Pure: a pattern is a list of (strength, seconds), strength in [0, 1]."""
 
 from lira.hal.messages import JoyFeedback
+from lira.tools.operator.situation import Urgency
 
 Pattern = tuple[tuple[float, float], ...]
 
 # Attention: two short taps. Feedback ("you decide"): three long, strong ones.
 ATTENTION: Pattern = ((0.5, 0.12), (0.0, 0.10), (0.5, 0.12))
 FEEDBACK: Pattern = ((1.0, 0.35), (0.0, 0.12), (1.0, 0.35), (0.0, 0.12), (1.0, 0.35))
+# It stands and needs you: five strong taps.
+NEED: Pattern = ((1.0, 0.12), (0.0, 0.12)) * 4 + ((1.0, 0.12),)
 # A request was taken: one tap.
 TAKEN: Pattern = ((0.5, 0.08),)
-CALLS = {"attention": ATTENTION, "feedback": FEEDBACK}
+PATTERNS = {Urgency.WATCH: ATTENTION, Urgency.ASK: FEEDBACK, Urgency.NEED: NEED}
 
 # `JoyFeedback.id` of our patterns; any other id is a plain rumble of the message's intensity.
 ATTENTION_ID, FEEDBACK_ID = 10, 11

@@ -6,6 +6,7 @@ import signal
 import socket
 import subprocess
 import sys
+import threading
 import time
 from collections.abc import Sequence
 from pathlib import Path
@@ -17,6 +18,15 @@ from lira.hal.errors import LiraError, StorageError
 STOP_SIGNALS = ((signal.SIGINT, 6.0), (signal.SIGTERM, 3.0), (signal.SIGKILL, 5.0))
 POLL_S = 0.02
 TAIL_LINES = 12
+# Becomes the command, in a process that the system asks to end when its parent dies, however that dies. Only Linux can,
+# and it goes by the thread that started the process: one that ends earlier takes the process with it.
+DIES_WITH_PARENT = f"""
+import ctypes, os, sys
+PR_SET_PDEATHSIG = 1
+ctypes.CDLL(None).prctl(PR_SET_PDEATHSIG, {signal.SIGTERM:d})
+if os.getppid() == int(sys.argv[1]):
+    os.execvp(sys.argv[2], sys.argv[2:])
+"""
 
 
 class ProcessError(LiraError):
@@ -44,7 +54,7 @@ def free_port() -> int:
 
 
 class ChildProcess:
-    """A process with its output in a log file. Leaving its `with` block stops it.
+    """A process with its output in a log file. Leaving its `with` block stops it, and so does the parent's death.
 
     It runs in a session of its own: Ctrl-C reaches the parent alone, which decides who stops first.
     """
@@ -59,7 +69,7 @@ class ChildProcess:
             raise StorageError(f"cannot write {log}: {error.strerror}", "Choose another folder.") from error
         with output:
             self._process = subprocess.Popen(
-                command,
+                _with_parent(command),
                 stdin=subprocess.DEVNULL,
                 stdout=output,
                 stderr=subprocess.STDOUT,
@@ -140,3 +150,10 @@ class ChildProcess:
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         self.stop()
+
+
+def _with_parent(command: Sequence[str]) -> list[str]:
+    """Return the command line that ends with this process, where the system knows how and this thread stays."""
+    if sys.platform != "linux" or threading.current_thread() is not threading.main_thread():
+        return list(command)
+    return [sys.executable, "-I", "-S", "-c", DIES_WITH_PARENT, str(os.getpid()), *command]

@@ -3,7 +3,7 @@
 import math
 from collections.abc import Callable, Sequence
 
-from lira.fusion.log.run_log import LapRecord, ResultRecord
+from lira.fusion.log.run_log import ContradictionRecord, LapRecord, ResultRecord
 
 HALVINGS = 60
 
@@ -41,6 +41,19 @@ def unseen_words(laps: Sequence[LapRecord]) -> str:
     collisions, lost = sum(lap.collisions for lap in laps), sum(lap.lost for lap in laps)
     passed = share_words(sum(lap.passed for lap in laps), len(laps))
     return f"alone it passed {passed}; collisions: {collisions}, lost lines: {lost}"
+
+
+def contradiction_words(found: Sequence[ContradictionRecord]) -> str:
+    """Which labels the novice does not follow, for whoever gave them to look at; empty where there are none."""
+    if not found:
+        return ""
+    label = "this label contradicts" if len(found) == 1 else f"these {len(found)} labels contradict"
+    each = [
+        f"{one.number} ({one.source}, lap {one.lap} at {one.stamp_s:.1f} s: "
+        f"turn {one.action[1]:+.2f}, the others {one.others[1]:+.2f})"
+        for one in found
+    ]
+    return f"{label} the rest and {'is' if len(found) == 1 else 'are'} not followed: {', '.join(each)}"
 
 
 def _at_least(passed: int, laps: int, rate: float) -> float:

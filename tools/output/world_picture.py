@@ -12,7 +12,8 @@ from lira.sim_backend.camera import PinholeCamera
 from lira.sim_backend.course import Course, footprint_radius_m
 from lira.sim_backend.layout import Block, Layout, Mark, outline
 from lira.sim_backend.polyline import Floats
-from lira.sim_backend.scene import Scene
+from lira.sim_backend.scenes.base import Pose
+from lira.sim_backend.scenes.sketch import SketchScene
 
 WIDE_PX = 960
 HIGH_PX = 560  # of the view from above, at most
@@ -31,14 +32,9 @@ PLACE = (40, 40, 230)
 INK = (0, 0, 0)
 PAPER = (255, 255, 255)
 
-Pose = tuple[float, float, float]
-
 
 def draw(layout: Layout, profile: RobotProfile) -> ByteArray:
-    """Draw the floor above the camera's views: uint8 [height, width, 3], blue, green, red.
-
-    Raises `MissingExtraError` without pybullet.
-    """
+    """Draw the floor above the camera's views: uint8 [height, width, 3], blue, green, red."""
     poses = view_poses(Course(layout, footprint_radius_m(profile.base)))
     return np.concatenate([from_above(layout, poses), from_the_robot(layout, profile, poses)])
 
@@ -51,10 +47,10 @@ def view_poses(course: Course) -> list[Pose]:
 
 def free_pose(course: Course, at_m: float) -> Pose:
     """Return a pose on the way with some room around it, at `at_m` or before."""
-    pose = course.layout.curve.pose(at_m)
+    pose = Pose(*course.layout.curve.pose(at_m))
     while at_m > 0.0 and course.clearance(np.array(pose[:2])) < FREE_M:
         at_m = max(at_m - BACK_M, 0.0)
-        pose = course.layout.curve.pose(at_m)
+        pose = Pose(*course.layout.curve.pose(at_m))
     return pose
 
 
@@ -80,17 +76,16 @@ def from_above(layout: Layout, poses: list[Pose]) -> ByteArray:
 def from_the_robot(layout: Layout, profile: RobotProfile, poses: list[Pose]) -> ByteArray:
     """Put the camera's views side by side, each below its letter."""
     shape = profile.camera
-    camera = PinholeCamera(shape, Scene(layout))
+    camera = PinholeCamera(shape, SketchScene(layout))
     wide_px = WIDE_PX // len(LETTERS) - 2 * BORDER_PX
     high_px = round(wide_px * shape.height_px / shape.width_px)
     resize = cv2.INTER_NEAREST if wide_px > shape.width_px else cv2.INTER_AREA
     strip = np.full((LETTER_PX + high_px + BORDER_PX, WIDE_PX, 3), PAPER, np.uint8)
     for number, (letter, pose) in enumerate(zip(LETTERS, poses, strict=True)):
         left_px = number * WIDE_PX // len(LETTERS) + BORDER_PX
-        view = cv2.resize(camera.render(*pose), (wide_px, high_px), interpolation=resize)
+        view = cv2.resize(camera.render(pose), (wide_px, high_px), interpolation=resize)
         strip[LETTER_PX : LETTER_PX + high_px, left_px : left_px + wide_px] = view[..., None]
         cv2.putText(strip, letter, (left_px, 19), cv2.FONT_HERSHEY_SIMPLEX, 0.5, INK, 1, cv2.LINE_AA)
-    camera.scene.close()
     return strip
 
 

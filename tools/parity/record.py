@@ -4,7 +4,8 @@ import time
 from dataclasses import dataclass, field
 from typing import Any, Generic, TypeVar
 
-from lira.hal.bus.bus import Bus, Reader
+from lira.hal.bus.bus import Bus
+from lira.hal.bus.reader import Reader
 from lira.hal.bus.sensors import Stamped
 from lira.hal.bus.services import LOCKSTEP, info_from_json
 from lira.hal.bus.topics import APPLIED, CAMERA, CMD_VEL, IMU, INFO, ODOM, SCAN

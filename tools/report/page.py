@@ -9,7 +9,7 @@ from importlib import resources
 import cv2
 import numpy as np
 
-from lira.tools.output.proven import proof_words, unseen_words
+from lira.tools.output.proven import contradiction_words, proof_words, unseen_words
 from lira.tools.report import plots
 from lira.tools.report.course import course
 from lira.tools.report.digest import Lap, Run
@@ -56,6 +56,9 @@ def head(run: Run, title: str) -> str:
     if unseen:
         words = unseen_words(unseen)
         parts.append(f"<p>{words[0].upper()}{words[1:]}.</p>")
+    contradictions = "" if run.result is None else contradiction_words(run.result.contradictions)
+    if contradictions:
+        parts.append(f"<p>{escape(contradictions[0].upper() + contradictions[1:])}.</p>")
     if run.head:
         parts.append(f"<p>To repeat it:</p><pre>{escape(run.head.command)}</pre>")
     return "".join(parts)

@@ -10,6 +10,7 @@ from lira.fusion.operator_service import OperatorService
 from lira.fusion.service import serve
 from lira.hal.client.remote import RemoteRobot
 from lira.tools.launch.lifetime import stop_or_interrupt
+from lira.tools.operator.voice import explain
 from lira.tools.runs.course import Course, show_alone
 from lira.tools.runs.progress import Publish, Say, telling
 from lira.tools.runs.reach import arena_of, request_line, restarter, world_of
@@ -25,7 +26,7 @@ def show(args: argparse.Namespace, robot: RemoteRobot, publish: Publish, say: Sa
         service = OperatorService(line, loop, method, journal, say, restart=restarter(robot, args))
         loop.arm()
         say(f"'{args.policy}' drives '{args.name}'; stop with Ctrl-C")
-        serve(loop, method, journal, stop, say, operator_service=service)
+        serve(loop, method, journal, stop, say, operator_service=service, explain=explain)
     return 0
 
 

@@ -28,7 +28,7 @@ from lira.hal.errors import LiraError
 from lira.hal.messages import Action
 from lira.hal.profile import RobotProfile, load_profile
 from lira.sim_backend.catalogue import load_world
-from lira.sim_backend.foresight import Foresight, sketching
+from lira.sim_backend.foresight import Foresight, with_small_camera
 from lira.tools.runs.progress import telling
 from lira.tools.runs.simulated import simulate
 
@@ -40,13 +40,13 @@ def train_expert(kind: str, task: str, profile: RobotProfile, seed: int, path: P
     torch.set_num_threads(1)
     course = curriculum(kind, task)
     world = load_world(course.world)
-    profile = blindfolded(profile) if kind == "lidar" else sketching(profile)
+    profile = blindfolded(profile) if kind == "lidar" else with_small_camera(profile)
     sees = next(row for row in modalities_of(profile) if row.sensor == kind)
     network = ExpertNet(sees.name, sees.shape(profile), profile.features.filters, seed=seed)
     trainer = InlineTrainer(Learner(network, seed=seed, frozen_trunks=False))
     novice = NetworkNovice(network.driving(), trainer, LearningSettings())
     with (
-        simulate(world, profile, seed=seed) as robot,
+        simulate(world, profile, seed=seed, renderer="sketch") as robot,
         closing(ScriptedTeacher(Foresight(profile, world), profile, course.teacher, seed)) as teacher,
     ):
         loop = ControlLoop(robot, truth=robot.arena.state)

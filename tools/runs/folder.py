@@ -5,11 +5,13 @@ from dataclasses import replace
 from pathlib import Path
 
 from lira.fusion.inference.checkpoint import Checkpoint, save_checkpoint
-from lira.fusion.learning.learned_policy import LearnedPolicy
-from lira.fusion.log.run_log import RunRecord
+from lira.fusion.learning.learned_policy import Contradiction, LearnedPolicy
+from lira.fusion.log.label_log import read_demonstrations
+from lira.fusion.log.run_log import ContradictionRecord, RunRecord
 from lira.fusion.operator_service import Job
 from lira.hal.errors import ConfigError
 from lira.hal.profile import RobotProfile
+from lira.tools.output.proven import contradiction_words
 
 LABELS, RECORD, NOVICE = "labels.lira", "run.jsonl", "novice.safetensors"
 
@@ -32,7 +34,7 @@ def snapshot(
     `sync` makes sure of the labels. The writing raises `StorageError`.
     """
     labels, steps, network = novice.stored, novice.training_steps, novice.frozen()
-    doubtful = aside_words(novice.set_aside())
+    aside = novice.set_aside()
 
     def write() -> str:
         sync()
@@ -43,14 +45,21 @@ def snapshot(
         about = Checkpoint.of(network, profile.name, head.command, head.seed)
         about = replace(about, labels=labels, training_steps=steps)
         save_checkpoint(folder / NOVICE, network, about)
-        return f"saved {labels} labels and the novice after {steps} training steps in {folder}{doubtful}"
+        doubtful = contradiction_words(in_the_log(folder / LABELS, aside))
+        return "\n".join(
+            filter(None, [f"saved {labels} labels and the novice after {steps} training steps in {folder}", doubtful])
+        )
 
     return write
 
 
-def aside_words(labels: Sequence[tuple[int, str]]) -> str:
-    """Which labels the novice does not believe, for whoever gave them to look at."""
-    if not labels:
-        return ""
-    names = ", ".join(f"{number} ({source})" for number, source in labels)
-    return f"; set aside, since the others contradict them, labels {names}"
+def in_the_log(path: Path, found: Sequence[Contradiction]) -> list[ContradictionRecord]:
+    """Find labels that a novice set aside in the log of all that it learned."""
+    if not found:
+        return []
+    learned = [(number, label) for number, label in enumerate(read_demonstrations(path)) if label.stored]
+    places = [(each, *learned[each.number]) for each in found if each.number < len(learned)]
+    return [
+        ContradictionRecord(number, each.source, label.lap, label.stamp_s, each.action, each.others)
+        for each, number, label in places
+    ]

@@ -7,7 +7,7 @@ from lira.fusion.experts.tasks import TASKS, task_of
 from lira.hal.profile import RobotProfile, load_profile
 from lira.hal.safety.governed import GovernedRobot
 from lira.sim_backend.catalogue import load_world
-from lira.sim_backend.sensors import Renderer
+from lira.sim_backend.scenes.opening import Renderer
 from lira.sim_backend.twin import Twin
 from lira.sim_backend.world import World
 
@@ -34,7 +34,7 @@ def simulate(
 
     `world` and `profile` are names, paths of TOML files, or what was loaded; without a profile it is the robot of the
     thesis's experiment in that world. Time passes only while somebody drives, or by itself with `realtime_factor`.
-    Raises `ConfigError` for a name that is none, `MissingExtraError` without pybullet.
+    Raises `ConfigError` for a name that is none, or if pybullet is asked for and missing.
     """
     place = load_world(world) if isinstance(world, str) else world
     kind = TASKS[task_of(place.name)].profile if profile is None else profile

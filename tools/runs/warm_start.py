@@ -37,7 +37,7 @@ def own_drive(name: str, profile: RobotProfile, pair: str) -> tuple[tuple[Featur
     world = curriculum(name, pair if pair in TASKS else DEFAULT).world
     seen: list[tuple[Features, Action]] = []
     layout = 0
-    with simulate(world, profile, renderer="tiny") as robot:
+    with simulate(world, profile, renderer="sketch") as robot:
         loop = ControlLoop(robot)
         loop.arm()
         while len(seen) < STEPS:

@@ -13,6 +13,7 @@ from lira.fusion.operator_service import OperatorService
 from lira.fusion.service import serve
 from lira.hal.client.remote import RemoteRobot
 from lira.tools.launch.lifetime import saving, stop_or_interrupt
+from lira.tools.operator.voice import explain
 from lira.tools.runs.build import NewTrainer, build_method
 from lira.tools.runs.folder import LABELS, RECORD, snapshot
 from lira.tools.runs.progress import Publish, Say
@@ -61,6 +62,7 @@ def learn_from_person(
                         say,
                         lambda: novice.training_steps,
                         operator_service=service,
+                        explain=explain,
                         layout=args.layout,
                     )
     return 0

@@ -14,14 +14,13 @@ exit status: 1 if something that has to stay flat did not, or a ratio is over 30
 import argparse
 import importlib
 import json
-import os
 import sys
 from pathlib import Path
-from typing import TextIO
 
-from lira.hal.config import write_whole
 from lira.hal.errors import ConfigError
-from lira.tools.bench import BENCHES, Row, cell, columns, describe_machine
+from lira.tools.bench import BENCHES, Row, describe_machine
+from lira.tools.options import add_json
+from lira.tools.output.machine import table, take_stdout, write_file
 
 LASTING = ("soak", "drivers")  # those that go on for --minutes
 
@@ -33,7 +32,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--minutes", type=float, help="how long the soak (default: 30) or the line of drivers (0.25) goes on"
     )
-    parser.add_argument("--json", metavar="FILE", help="write a JSON object to FILE (-: standard output)")
+    add_json(parser)
     parser.add_argument("--history", type=Path, metavar="DIR", help="add the ratios to DIR/NAME.jsonl and compare")
 
 
@@ -69,27 +68,3 @@ def note(path: Path, results: list[Row]) -> bool:
     if lines:
         print(f"worse than before: {'; '.join(lines)}", file=sys.stderr)
     return bool(lines)
-
-
-def take_stdout() -> TextIO:
-    """Return standard output for the JSON alone; from now on whatever else is printed goes to standard error.
-
-    The libraries below print from C, and may do so as late as at exit: the descriptor itself is moved.
-    """
-    sys.stdout.flush()
-    kept = os.fdopen(os.dup(sys.stdout.fileno()), "w", encoding="utf-8")
-    os.dup2(sys.stderr.fileno(), sys.stdout.fileno())
-    return kept
-
-
-def write_file(path: Path, text: str) -> None:
-    """Write the object. Raises `StorageError`."""
-    write_whole(path, (text + "\n").encode())
-
-
-def table(results: list[Row]) -> str:
-    """Rows for a person."""
-    from lira.tools.output.table import format_table
-
-    names = columns(results)
-    return format_table(names, [[cell(row.get(name)) for name in names] for row in results])

@@ -18,6 +18,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from lira.hal.errors import ConfigError
+from lira.tools.options import add_profile
 
 if TYPE_CHECKING:
     from lira.robot.settings import BaseSettings
@@ -43,7 +44,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add("--only", choices=("distance", "turn"), help="calibrate one of the two (default: both)")
     add("--distance", type=float, default=1.0, metavar="M", help="how far to drive (default: %(default)s)")
     add("--turns", type=float, default=2.0, metavar="N", help="how many times to turn (default: %(default)s)")
-    add("--profile", default="rosbot2", help="robot by name or .toml file (default: %(default)s)")
+    add_profile(parser, "rosbot2")
     add("--yes", action="store_true", help="the way is free: do not ask")
 
 

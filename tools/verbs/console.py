@@ -15,6 +15,7 @@ import contextlib
 from pathlib import Path
 
 from lira.tools.launch.lifetime import CLOSE_S, stop_or_interrupt
+from lira.tools.options import add_client
 
 ANSWER_S = 10.0
 
@@ -22,8 +23,7 @@ ANSWER_S = 10.0
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
     add = parser.add_argument
-    add("--name", default="rosbot", help="the robot's name on the bus (default: %(default)s)")
-    add("--connect", default="127.0.0.1:7447", metavar="HOST:PORT", help="where the robot is (default: %(default)s)")
+    add_client(parser)
     add("--no-keyboard", action="store_true", help="do not drive from the keyboard")
     add("--screenshot", type=Path, metavar="FILE", help="draw a sample without a robot or a screen into a .png")
 
@@ -45,8 +45,8 @@ def run(args: argparse.Namespace) -> int:
     from lira.hal.bus.bus import Bus
     from lira.hal.bus.services import LOCKSTEP, info_from_json
     from lira.hal.bus.topics import INFO
-    from lira.tools.console.listen import Ears
     from lira.tools.joystick.client import TeleopClient
+    from lira.tools.operator.listen import Ears
 
     with contextlib.ExitStack() as stack:
         bus = Bus(args.name, connect=args.connect)

@@ -28,13 +28,13 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from lira.hal.errors import ConfigError, MissingExtraError
-from lira.tools.options import add_protocol, natural
+from lira.tools.options import add_expert, add_layout, add_protocol, add_seed, natural
 
 if TYPE_CHECKING:
     from lira.tools.launch.launch import Part
     from lira.tools.launch.processes import ChildProcess
 
-NEEDED = {"pybullet": "sim", "torch": "learn"}  # by the two processes, and the extras that bring them
+NEEDED = {"torch": "learn"}  # and the extras that bring it
 NEEDED_BY_WIRE = {"serial": "robot"}
 POLL_S = 0.1
 STALL_S = 60.0
@@ -46,15 +46,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add("--world", help="world by name or .toml file (default: line-obstacles; with --wire lane, which is shorter)")
     add("--profile", help="robot by name or .toml file (default: that of the world's experiment)")
     add("--method", default="plus", help="way of teaching, as in `lira fusion` (default: %(default)s)")
-    add(
-        "--expert",
-        action="append",
-        default=[],
-        metavar="MODULE:OBJECT",
-        help="beside the pair, an expert of your own, as in `lira fusion`; may be given several times",
-    )
-    add("--seed", type=natural, default=0, help="seeds teacher, training and noise (default: %(default)s)")
-    add("--layout", type=natural, default=0, help="layout to learn on (default: %(default)s)")
+    add_expert(parser)
+    add_seed(parser, "seeds teacher, training and noise")
+    add_layout(parser, "layout to learn on")
     add("--laps", type=natural, default=12, help="give up after so many training laps (default: %(default)s)")
     add("--unseen", type=natural, default=3, help="unseen layouts to drive afterwards (default: %(default)s)")
     add_protocol(parser, layouts="fresh", proof="fresh:3")
@@ -63,6 +57,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--wire",
         action="store_true",
         help="through the robot's drivers: `lira robot` on emulated devices, in real time",
+    )
+    add(
+        "--renderer",
+        choices=("sketch", "tiny", "egl"),
+        default="sketch",
+        help="what draws and measures the world, as in `lira twin` (default: %(default)s)",
     )
     add("--run", type=Path, metavar="DIR", help="folder of the run (default: runs/demo-<date-time>)")
 
@@ -98,7 +98,7 @@ def run(args: argparse.Namespace) -> int:
     port = free_port()
     name, endpoint = f"demo_{port}", f"127.0.0.1:{port}"
     both = ["--layout", str(args.layout), "--seed", str(args.seed)]
-    twin = ["--world", world, "--profile", robot, *both]
+    twin = ["--world", world, "--profile", robot, "--renderer", args.renderer, *both]
     fusion = [*both, "--name", name, "--connect", endpoint, "--method", args.method, "--teacher", "scripted"]
     fusion += ["--run", str(folder), "--train-laps", str(args.laps), "--unseen", str(args.unseen)]
     fusion += ["--layouts", args.layouts, "--proof", args.proof]
@@ -184,7 +184,7 @@ def raise_dead(parts: Sequence["ChildProcess"]) -> None:
 
 def conclude(folder: Path) -> int:
     """Print the table, write the report, and return 0 if the novice was proven and passed every unseen layout."""
-    from lira.tools.output.proven import proof_words, unseen_words
+    from lira.tools.output.proven import contradiction_words, proof_words, unseen_words
     from lira.tools.output.table import format_table
     from lira.tools.report import RECORD, write_report
     from lira.tools.report.digest import load_run
@@ -194,8 +194,10 @@ def conclude(folder: Path) -> int:
     print(f"\n{format_table(COLUMNS, [lap_cells(lap) for lap in run.laps])}\n")
     unseen = [lap.record for lap in run.phase("unseen") if lap.record is not None]
     proven = run.result is not None and run.result.converged
-    for words in (unseen_words(unseen), "" if run.result is None else proof_words(run.result)):
-        if words:
-            print(words)
+    said = [unseen_words(unseen)]
+    if run.result is not None:
+        said += [proof_words(run.result), contradiction_words(run.result.contradictions)]
+    for words in filter(None, said):
+        print(words)
     print(f"report: {write_report(folder)}")
     return 0 if proven and all(lap.passed for lap in unseen) else 1

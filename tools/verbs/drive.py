@@ -17,7 +17,7 @@ exit status: 1 if a layout was not passed
 import argparse
 
 from lira.tools.launch.lifetime import CLOSE_S
-from lira.tools.options import add_robot, add_shield, natural
+from lira.tools.options import add_arena, add_client, add_layout, add_pair, add_shield, natural
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -28,7 +28,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="POLICY",
         help="a .safetensors file, camera-expert, lidar-expert, or your own MODULE:OBJECT",
     )
-    add_robot(parser)
+    add_client(parser)
+    add_arena(parser)
+    add_pair(parser)
     add(
         "--ask",
         action="store_true",
@@ -41,7 +43,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         default=0,
         help="drive so many layouts of a twin, those after --layout (default: until it is told to stop)",
     )
-    add("--layout", type=natural, default=0, help="layout to reset a twin to (default: %(default)s)")
+    add_layout(parser, "layout to reset a twin to")
 
 
 def run(args: argparse.Namespace) -> int:

@@ -5,10 +5,12 @@ folder: run the same command again to go on, or with more seeds to add to it. A 
 than today's is played again. A run that did not converge within its laps is counted as censored, with the labels it had
 used by then. The folder also gets a page (NAME.html) and the drawings.
 
-'all' does every experiment, keeps their summaries and writes RESULTS.md; 'results' writes RESULTS.md alone.
+'all' does every experiment, keeps their summaries and writes RESULTS.md and docs/results; 'results' writes these alone.
 
 examples:
-  lira experiment table2 --seeds 10 --workers 2
+  lira experiment unseen --seeds 10 --workers 2
+  lira experiment unseen --seeds 10 --first-seed 300 --pairs line@1,line@2,line@3 --methods all
+  lira experiment unseen --seeds 10 --methods plus --shift gray
   lira experiment table2 --seeds 10 --workers 2 --methods hold,hg-dagger    # all: every method
   lira experiment race --seeds 10 --scheduler tcp://192.168.1.5:8786 --json race.json
   lira experiment all --seeds 10 --workers 2
@@ -22,12 +24,10 @@ from typing import TYPE_CHECKING
 
 from lira.hal.errors import ConfigError
 from lira.tools.experiments.registry import REGISTRY, load, words_of
-from lira.tools.options import natural
+from lira.tools.options import add_json, natural
 
 if TYPE_CHECKING:
-    from lira.tools.experiments.experiment import Experiment
-    from lira.tools.experiments.summary import Summary
-    from lira.tools.experiments.trial import Trial
+    from lira.tools.experiments.output.summary import Summary
 
 FOLDER = Path("runs") / "experiments"
 ALL, RESULTS = "all", "results"
@@ -54,22 +54,37 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     add(
         "--experts",
-        metavar="PAIR",
-        help="another pair of experts: TASK@SEED, which is trained first if need be, or a folder with "
-        "camera.safetensors and lidar.safetensors (default: those of the world)",
+        "--pairs",
+        metavar="PAIRS",
+        help="other pairs of experts, separated by commas: TASK@SEED, which is trained first if need be, or a folder "
+        "with camera.safetensors and lidar.safetensors (default: those of the world)",
     )
+    add("--world", help="of unseen: another world, by its name or its TOML file")
+    add("--teacher", help="of unseen: scripted (skilled), perfect or unskilled")
+    add(
+        "--shift",
+        help="of unseen: what is other where the novice is tried than where it was taught: gray, boxes, curvature, "
+        "noise, camera or slip",
+    )
+    add("--ways", help="of unseen: how novices are tried: plain, field, shield, ask (default: plain,shield)")
+    add("--more", type=natural, default=0, help="of unseen: teach on for so many laps, to see whether that spoils it")
     add("--workers", type=int, default=1, help="processes side by side (default: %(default)s)")
     add("--scheduler", metavar="ADDRESS", help="run on this Dask cluster instead, like tcp://192.168.1.5:8786")
     add("--run", type=Path, default=FOLDER, metavar="DIR", help="keeps the trials and pages (default: %(default)s)")
-    add("--json", metavar="FILE", help="write a JSON object to FILE (-: standard output)")
+    add_json(parser)
     add("--summaries", type=Path, metavar="DIR", help="summaries of all experiments (default: those of the project)")
-    add("--out", type=Path, metavar="FILE", help="where all and results write (default: the project's RESULTS.md)")
+    add(
+        "--out",
+        type=Path,
+        metavar="FILE",
+        help="where all and results write, with docs/results beside it (default: the project's RESULTS.md)",
+    )
 
 
 def run(args: argparse.Namespace) -> int:
     """Run the trials that are missing and print the tables."""
-    from lira.tools.experiments.summary import to_json
-    from lira.tools.verbs.bench import take_stdout, write_file
+    from lira.tools.experiments.output.summary import to_json
+    from lira.tools.output.machine import take_stdout, write_file
 
     if args.seeds < 1 or args.workers < 1:
         raise ConfigError("--seeds and --workers are at least 1", "Give a positive number.")
@@ -88,78 +103,43 @@ def run(args: argparse.Namespace) -> int:
 
 def play(args: argparse.Namespace, name: str) -> "tuple[Summary, Path]":
     """Run one experiment; return its summary and its page."""
-    import msgspec
-
     from lira.fusion.methods.presets import file_name
-    from lira.tools.experiments.page import write_page
+    from lira.tools.experiments.output.page import write_page
+    from lira.tools.experiments.output.summary import summarise
     from lira.tools.experiments.pools import Cluster, Here
     from lira.tools.experiments.runner import run_trials
-    from lira.tools.experiments.summary import summarise
+    from lira.tools.experiments.selection import Selection
     from lira.tools.runs.expert_training import provide
 
     experiment = load(name)
     pool = Here(args.workers) if args.scheduler is None else Cluster(args.scheduler)
-    methods = ALL if args.name == ALL and experiment.methods else args.methods
-    chosen = chosen_methods(methods, experiment, name)
-    listed = experiment.trials(args.seeds)
-    trials = [trial for trial in listed if not chosen or trial.method.name in chosen]
-    if args.method:
-        trials += own_trials(args.method, listed, experiment, name)
-    trials = [msgspec.structs.replace(each, seed=args.first_seed + each.seed) for each in trials]
-    if args.experts is not None:
-        if args.name != ALL and all(trial.experts for trial in trials):
-            raise ConfigError(f"{name} takes no --experts", "It is played with experts of its own choice.")
-        trials = [msgspec.structs.replace(each, experts=each.experts or args.experts) for each in trials]
+    selection = Selection(
+        seeds=args.seeds,
+        first_seed=args.first_seed,
+        methods=ALL if args.name == ALL and experiment.methods else args.methods,
+        own=args.method,
+        pairs=args.experts.split(",") if args.experts else (),
+        world=args.world,
+        teacher=args.teacher,
+        shift=args.shift,
+        more=args.more,
+        ways=tuple(args.ways.split(",")) if args.ways else (),
+        all_experiments=args.name == ALL,
+    )
+    trials = selection.trials(experiment, name)
     for pair in dict.fromkeys(trial.pair for trial in trials):
         provide(pair)
     outcomes = run_trials(trials, args.run, pool)
-    command = f"lira experiment {name} --seeds {args.seeds}" + ("" if methods is None else f" --methods {methods}")
-    command += f" --first-seed {args.first_seed}" if args.first_seed else ""
-    command += "" if args.experts is None else f" --experts {args.experts}"
-    command += "".join(f" --method {each}" for each in args.method)
-    summary = summarise(file_name(name), words_of(name, experiment), command, args.seeds, experiment, outcomes)
+    command = f"lira experiment {name} {selection.command}"
+    summary = summarise(
+        file_name(name) + selection.elsewhere, words_of(name, experiment), command, args.seeds, experiment, outcomes
+    )
     return summary, write_page(args.run, summary, experiment.figures(outcomes))
-
-
-def own_trials(names: list[str], listed: "list[Trial]", experiment: "Experiment", name: str) -> "list[Trial]":
-    """Return the trials of methods of one's own: those of one that is known, on its layouts and with its proof."""
-    import msgspec
-
-    from lira.fusion.methods.presets import method_named
-
-    if not experiment.methods:
-        raise ConfigError(f"{name} takes no --method", "It needs all of its methods together.")
-    like = [trial for trial in listed if trial.method.name == experiment.methods[0]]
-    return [
-        msgspec.structs.replace(
-            trial, method=msgspec.structs.replace(method_named(own), syllabus=trial.method.syllabus)
-        )
-        for own in names
-        for trial in like
-    ]
-
-
-def chosen_methods(words: str | None, experiment: "Experiment", name: str) -> set[str]:
-    """Return the methods that were asked for, or the usual ones; nothing where there is no choice.
-
-    Raises `ConfigError`.
-    """
-    known = experiment.methods
-    if words is None:
-        return set(experiment.usual)
-    if not known:
-        raise ConfigError(f"{name} takes no --methods", "It needs all of its methods together.")
-    if words == ALL:
-        return set(known)
-    chosen = set(words.split(","))
-    if not chosen <= set(known):
-        raise ConfigError(f"{name} has no method '{min(chosen - set(known))}'", f"Known: {', '.join(known)}; or {ALL}.")
-    return chosen
 
 
 def show(summary: "Summary", page: Path) -> None:
     """Print tables, verdicts and where the page is."""
-    from lira.tools.verbs.bench import table
+    from lira.tools.output.machine import table
 
     for each in summary.tables:
         print(f"\n{each.title}\n{table(each.rows)}")
@@ -174,9 +154,9 @@ def show(summary: "Summary", page: Path) -> None:
 
 
 def write_results(args: argparse.Namespace) -> int:
-    """Play everything first if asked to; then write RESULTS.md from the summaries that are there."""
-    from lira.tools.experiments import document
-    from lira.tools.experiments.summary import read_summaries, write_summary
+    """Play everything first if asked to; then write the documents from the summaries that are there."""
+    from lira.tools.experiments.output import document, lead
+    from lira.tools.experiments.output.summary import read_summaries, write_summary
 
     if args.methods is not None or args.method:
         raise ConfigError(f"{args.name} takes no --methods", "It is about all of them.")
@@ -190,6 +170,7 @@ def write_results(args: argparse.Namespace) -> int:
     if not summaries:
         raise ConfigError(f"{folder} holds no summary", "Make them with: lira experiment all")
     out = args.out or document.DOCUMENT
-    document.write_document(out, document.document(summaries, document.read_causes()))
-    print(f"results: {out}")
+    document.write_documents(out, document.documents(summaries, document.read_causes(), out.name))
+    lead.draw(summaries, out.parent)
+    print(f"results: {out}, and {document.PAGES} beside it")
     return 0

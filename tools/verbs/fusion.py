@@ -20,7 +20,18 @@ from typing import TYPE_CHECKING
 
 from lira.hal.errors import ConfigError
 from lira.tools.launch.lifetime import CLOSE_S
-from lira.tools.options import add_protocol, add_robot, add_shield, natural
+from lira.tools.options import (
+    DEFAULT,
+    add_arena,
+    add_client,
+    add_expert,
+    add_layout,
+    add_pair,
+    add_protocol,
+    add_seed,
+    add_shield,
+    natural,
+)
 
 if TYPE_CHECKING:
     from lira.hal.client.remote import RemoteRobot
@@ -28,29 +39,34 @@ if TYPE_CHECKING:
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Declare the arguments."""
-    add = parser.add_argument
-    add_robot(parser)
-    add_shield(parser, "what drives unseen layouts")
-    add(
+    """Declare the arguments: which robot, what learns, and how is taught."""
+    add_client(parser)
+    parser.add_argument(
         "--method",
         required=True,
         help="learn by this method: plus, hold (LIRA-SPF), thesis, hg-dagger, ..., or your own MODULE:OBJECT; "
         "an unknown name lists them all",
     )
-    add(
-        "--expert",
-        action="append",
-        default=[],
-        metavar="MODULE:OBJECT",
-        help="beside the pair, an expert of your own: a function of lira.Features; may be given several times",
-    )
+    add_pair(parser)
+    add_expert(parser)
+    add_shield(parser, "what drives unseen layouts")
+    add_teaching(parser)
+    add_layout(parser, "layout to learn on, and to reset a twin to")
+    add_seed(parser, "seeds teacher and training")
+    add = parser.add_argument
+    add("--run", type=Path, metavar="DIR", help="folder for what is learned (default: runs/<method>)")
+    add("--as-command", help=argparse.SUPPRESS)  # what a report shows as the command that repeats the run
+
+
+def add_teaching(parser: argparse.ArgumentParser) -> None:
+    """Declare how is taught, and by whom."""
+    add = parser.add_argument
     add("--start", choices=("human", "experts"), help="LIRA-SPF: who drives before the first training step")
     add(
         "--idle-frames",
         choices=("label", "skip"),
         default="label",
-        help="steps with the dead-man held and the stick at rest: labels as all others, or none (default: %(default)s)",
+        help=f"steps with the dead-man held and the stick at rest: labels as all others, or none {DEFAULT}",
     )
     add(
         "--teacher",
@@ -58,23 +74,15 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         default="none",
         help="who helps: a person with a gamepad (none), or on a twin a script with few, no or many human faults",
     )
-    add(
-        "--train-laps",
-        type=natural,
-        default=12,
-        help="scripted teacher: give up after so many laps (default: %(default)s)",
-    )
+    add_arena(parser)
+    add("--train-laps", type=natural, default=12, help=f"scripted teacher: give up after so many laps {DEFAULT}")
     add_protocol(parser)
     add(
         "--unseen",
         type=natural,
         default=0,
-        help="(then) drive so many layouts alone, those after --layout (default: %(default)s)",
+        help=f"(then) drive so many layouts alone, those after --layout {DEFAULT}",
     )
-    add("--layout", type=natural, default=0, help="layout to learn on, and to reset a twin to (default: %(default)s)")
-    add("--seed", type=natural, default=0, help="seeds teacher and training (default: %(default)s)")
-    add("--run", type=Path, metavar="DIR", help="folder for what is learned (default: runs/<method>)")
-    add("--as-command", help=argparse.SUPPRESS)  # what a report shows as the command that repeats the run
 
 
 def run(args: argparse.Namespace) -> int:

@@ -5,10 +5,11 @@ START, held for a second, releases it. Letting go of the dead-man gives control 
 on, triangle saves, circle, held for a second, begins anew; the d-pad gives control to an expert.
 
 examples:
-  lira joystick                                     the first pad that has the controls of a PS3 pad
+  lira joystick                                     the first pad whose layout is known
   lira joystick --device /dev/input/event5          this one
   lira joystick --learn my-pad.toml                 write the file of another pad by being asked for each control
   lira joystick --pad my-pad.toml
+  lira joystick --rules                             the udev rule for who may not read pads
   lira joystick --connect 192.168.1.20:7447         a robot on another machine
 """
 
@@ -18,6 +19,7 @@ from pathlib import Path
 
 from lira.hal.errors import DeviceError
 from lira.tools.launch.lifetime import CLOSE_S, stop_or_interrupt
+from lira.tools.options import add_client
 
 ANSWER_S = 10.0
 
@@ -25,22 +27,26 @@ ANSWER_S = 10.0
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
     add = parser.add_argument
-    add("--name", default="rosbot", help="the robot's name on the bus (default: %(default)s)")
-    add("--connect", default="127.0.0.1:7447", metavar="HOST:PORT", help="where the robot is (default: %(default)s)")
-    add("--pad", default="ps3", metavar="NAME|FILE", help="kind of pad by name or .toml file (default: %(default)s)")
+    add_client(parser)
+    add("--pad", metavar="NAME|FILE", help="layout of the pad by name, or a .toml file (default: by what the pad is)")
     add("--device", metavar="PATH", help="the pad's /dev/input/event* or a link to it (default: the first that fits)")
     add("--learn", type=Path, metavar="FILE", help="ask for each control and write a new pad's file, then end")
+    add("--rules", action="store_true", help="print the udev rule that lets this user read pads, then end")
 
 
 def run(args: argparse.Namespace) -> int:
     """Bridge until told to stop."""
     if not sys.platform.startswith("linux"):
         raise DeviceError("gamepads are read through Linux's evdev", "Use `lira console`, which has a keyboard.")
+    if args.rules:
+        from lira.tools.joystick.rules import rules_text
+
+        sys.stdout.write(rules_text())
+        return 0
+    from lira.tools.joystick.finder import Finder
     from lira.tools.joystick.mapping import load_mapping
 
-    mapping = load_mapping(args.pad)
-    from lira.tools.joystick.pad import Finder  # without evdev, that is said before a robot is looked for
-
+    mapping = None if args.pad is None else load_mapping(args.pad)
     if args.learn is not None:
         from lira.tools.joystick.pad_wizard import learn
 
@@ -58,7 +64,8 @@ def run(args: argparse.Namespace) -> int:
             bus.ask(INFO, timeout_s=ANSWER_S)
             watch = Bus(args.name, connect=args.connect, watch=True)
             client = TeleopClient(bus, watch, ANSWER_S, say)
-            bridge = Bridge(mapping, client, Finder(mapping, args.device), PadMemory(state_file(), say), say)
+            finder = Finder(mapping, args.device)
+            bridge = Bridge(client, finder, PadMemory(state_file(), say), say, finder.advice)
             say(f"joystick drives '{args.name}' at {args.connect}; stop with Ctrl-C")
             bridge.run(stop)
     finally:

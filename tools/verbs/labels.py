@@ -1,52 +1,192 @@
-"""Look through a log of labels (labels.lira) for damage. Nothing that was stored is ever deleted.
+"""Look at the labels of a log (labels.lira), take some back, and say which of them make an action.
 
-Bytes that were lost, added or overwritten cost the labels they hit; all others are found. A learner that opens a
-damaged log does the same as --repair: it goes on with a clean file, and the damaged one stays beside it.
+Nothing that was stored is ever deleted. What is taken back stays in the log, marked, and can be learned again; the
+novice of plus beside the log is learned anew at once. Bytes that were lost, added or overwritten cost the labels they
+hit; all others are found. A learner that opens a damaged log does the same as --repair: it goes on with a clean file,
+and the damaged one stays beside it.
 
 examples:
-  lira labels check runs/mine/labels.lira              what is in it, and what cannot be read
-  lira labels check runs/mine/labels.lira --repair     write a clean file; the old one becomes labels.lira.damaged
-  lira labels check runs/mine/labels.lira --json -     the same as JSON
+  lira labels list runs/mine/labels.lira               all labels, with the numbers by which the others know them
+  lira labels undo runs/mine/labels.lira               take back the last intervention
+  lira labels undo FILE --number 12 40-43              ... these labels
+  lira labels undo FILE --source camera --from 30 --to 35   ... what the camera expert showed in these seconds
+  lira labels redo FILE --number 12                    learn it again
+  lira labels explain FILE --number 12                 which labels make what the novice does where that one was given
+  lira labels explain FILE --time 41.2 --run 0         ... at the label that is nearest to this time
+  lira labels merge A B -o C                           the labels of two runs of one robot in one log
+  lira labels check FILE --repair                      write a clean file; the old one becomes labels.lira.damaged
 
-exit status: 0 if all of it can be read (or now can), 1 if not, 2 if it is no log
+exit status: 0 if it was done; check: 1 if something cannot be read (and was not repaired); 2 if it is no log
 """
 
 import argparse
 import json
+from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from lira.hal.errors import ConfigError
+from lira.tools.options import add_json
+
 if TYPE_CHECKING:
     from lira.fusion.log.label_salvage import Survey
+    from lira.tools.labels.choose import Wanted
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
+    from lira.tools.labels.numbers import numbers
+
     add = parser.add_argument
-    add("what", choices=("check",), help="what to do")
-    add("file", type=Path, metavar="FILE", help="the log")
-    add("--repair", action="store_true", help="put a clean file in its place, and keep the damaged one beside it")
-    add("--profile", help="whose labels they are, if the file does not say (default: the known robots)")
-    add("--json", metavar="FILE", help="write a JSON object to FILE (-: standard output)")
+    add("what", choices=tuple(DOES), help="what to do")
+    add("file", type=Path, nargs="+", metavar="FILE", help="the log; for merge two of them")
+    add("--number", type=numbers, nargs="+", default=(), metavar="N", help="labels by number, like 12 or 40-43")
+    add("--source", help="undo, redo: labels of the human, or of an expert by name")
+    add("--from", type=float, dest="from_s", metavar="S", help="undo, redo: from this time of the robot's clock on")
+    add("--to", type=float, dest="to_s", metavar="S", help="undo, redo: up to this time")
+    add("--time", type=float, metavar="S", help="explain: the label that is nearest to this time")
+    add("--run", type=int, metavar="R", help="of this run in the log (default: the last that fits)")
+    add("-o", "--output", type=Path, metavar="FILE", help="merge: the new log")
+    add(
+        "--repair", action="store_true", help="check: put a clean file in its place, and keep the damaged one beside it"
+    )
+    add("--profile", help="check: whose labels they are, if the file does not say (default: the known robots)")
+    add_json(parser)
 
 
 def run(args: argparse.Namespace) -> int:
+    """Do it, and say what came of it."""
+    needed = 2 if args.what == "merge" else 1
+    if len(args.file) != needed:
+        raise ConfigError(f"{args.what} takes {needed} log{'s' * (needed > 1)}", "See: lira labels --help")
+    return DOES[args.what](args)
+
+
+def list_labels(args: argparse.Namespace) -> int:
+    """Show all labels."""
+    from lira.fusion.log.label_log import read_demonstrations
+    from lira.hal.errors import LiraError
+    from lira.tools.labels.relearn import relearn
+    from lira.tools.labels.words import list_rows, list_table
+
+    path = args.file[0]
+    labels = list(read_demonstrations(path))
+    try:
+        novice, learned = relearn(path)
+        aside = {learned[each.number] for each in novice.set_aside()}
+    except LiraError:
+        aside = set()  # no novice is there that could tell
+    rows = list_rows(labels, aside)
+    return tell(args, {"file": str(path), "labels": rows}, list_table(rows))
+
+
+def undo(args: argparse.Namespace) -> int:
+    """Take labels back, or learn them again."""
+    from lira.fusion.log.label_edit import correct
+    from lira.fusion.log.label_log import read_demonstrations
+    from lira.tools.labels.choose import choose
+    from lira.tools.labels.numbers import ranges
+    from lira.tools.labels.relearn import rewrite
+
+    path, again = args.file[0], args.what == "redo"
+    labels = list(read_demonstrations(path))
+    wanted = wanted_of(args)
+    undone = [number for number, label in enumerate(labels) if label.undone]
+    found = undone if again and wanted.nothing else choose(labels, wanted)
+    changed = correct(path, found, stored=again)
+    numbers = [number for number in found if (labels[number].undone if again else labels[number].stored)]
+    what = "learned again" if again else "taken back"
+    lines = [f"{what}: {len(changed)} label{'s' * (len(changed) != 1)} {ranges(numbers)}".rstrip()]
+    if changed:
+        lines.append(rewrite(path))
+    if changed and not again:
+        lines.append(f"they stay in the log; to learn them again: lira labels redo {path} --number {ranges(numbers)}")
+    return tell(args, {"file": str(path), "numbers": numbers, "stored": again}, "\n".join(lines))
+
+
+def explain(args: argparse.Namespace) -> int:
+    """Say which labels make an action."""
+    from lira.fusion.log.label_log import read_demonstrations
+    from lira.tools.labels.choose import nearest, one_of
+    from lira.tools.labels.relearn import relearn
+    from lira.tools.labels.words import pair, part_rows, part_table
+
+    path = args.file[0]
+    labels = list(read_demonstrations(path))
+    if (args.time is None) is (not args.number):
+        raise ConfigError("explain needs one label", "Give its --number, or a --time near it.")
+    at = one_of(labels, wanted_of(args).numbers) if args.number else nearest(labels, args.time, args.run)
+    novice, learned = relearn(path)
+    label = labels[at]
+    seen = label.features
+    rows = part_rows(novice.explain(seen), learned, labels)
+    action, alone, deviation = novice.act(seen), novice.alone(seen), novice.deviation(seen)
+    where = f"label {at} (run {label.run}, lap {label.lap}, {label.stamp_s:.1f} s) says {pair(label.action)}"
+    head = (
+        f"{where} by {label.source}; the novice does {pair(action)}, alone {pair(alone)}, give or take "
+        f"{deviation[0]:.2f}, {deviation[1]:.2f}"
+    )
+    found = {"number": at, "action": action, "alone": alone, "deviation": deviation, "parts": rows}
+    return tell(args, {"file": str(path), **found}, f"{head}\n\n{part_table(rows)}")
+
+
+def merge(args: argparse.Namespace) -> int:
+    """Make one log of two."""
+    from lira.fusion.log import label_edit
+
+    if args.output is None:
+        raise ConfigError("merge needs a file to write to", "Give it with -o FILE.")
+    one, other = args.file
+    count, both = label_edit.merge(one, other, args.output)
+    twice = f"; {both} of them are in both, and kept once" if both else ""
+    words = f"{args.output}: {count} labels{twice}\nto go on with them: put it into a folder as labels.lira, then "
+    words += "lira fusion --method NAME --run DIR"
+    return tell(args, {"file": str(args.output), "labels": count, "in_both": both}, words)
+
+
+def check(args: argparse.Namespace) -> int:
     """Check, repair if asked to, and say what was found."""
     from lira.fusion.log.label_log import check_log, repair_log
     from lira.hal.profile import known_profiles, load_profile
-    from lira.tools.verbs.bench import write_file
 
+    path = args.file[0]
     robots = [load_profile(name) for name in ([args.profile] if args.profile else known_profiles())]
     kept: Path | None = None
     if args.repair:
-        found, kept = repair_log(args.file, robots)
+        found, kept = repair_log(path, robots)
     else:
-        found = check_log(args.file, robots)
-    text = json.dumps(row(args.file, found, kept), indent=2)
+        found = check_log(path, robots)
+    tell(args, row(path, found, kept), words(path, found, kept))
+    return 1 if found.words() and kept is None else 0
+
+
+DOES: dict[str, Callable[[argparse.Namespace], int]] = {
+    "list": list_labels,
+    "undo": undo,
+    "redo": undo,
+    "explain": explain,
+    "merge": merge,
+    "check": check,
+}
+
+
+def wanted_of(args: argparse.Namespace) -> "Wanted":
+    """Which labels the arguments mean."""
+    from lira.tools.labels.choose import Wanted
+
+    numbers = tuple(number for each in args.number for number in each)
+    return Wanted(numbers, args.source, args.from_s, args.to_s, args.run)
+
+
+def tell(args: argparse.Namespace, found: dict[str, Any], said: str) -> int:
+    """Write JSON where it is wanted, and say the same in words unless JSON goes where they would."""
+    from lira.tools.output.machine import write_file
+
+    text = json.dumps(found, indent=2)
     if args.json not in (None, "-"):
         write_file(Path(args.json), text)
-    print(text if args.json == "-" else words(args.file, found, kept), flush=True)
-    return 1 if found.words() and kept is None else 0
+    print(text if args.json == "-" else said, flush=True)
+    return 0
 
 
 def row(path: Path, found: "Survey", kept: Path | None) -> dict[str, Any]:

@@ -22,7 +22,7 @@ from typing import TYPE_CHECKING
 
 from lira.hal.errors import ConfigError, StorageError
 from lira.tools.launch.lifetime import CLOSE_S
-from lira.tools.options import natural
+from lira.tools.options import add_json, add_profile, add_seed, add_world
 
 if TYPE_CHECKING:
     from lira.tools.launch.launch import Part
@@ -38,11 +38,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
     add = parser.add_argument
     add("robots", nargs="*", metavar="NAME@HOST:PORT", help="two robots (default: a twin, directly and by wire)")
-    add("--world", default="room", help="of the own twins: by name or .toml file (default: %(default)s)")
-    add("--profile", default="rosbot2", help="of the own twins: by name or .toml file (default: %(default)s)")
-    add("--seed", type=natural, default=0, help="of the own twins' noise (default: %(default)s)")
+    add_world(parser, "room", "the own twins' world")
+    add_profile(parser, "rosbot2", "the own twins' robot")
+    add_seed(parser, "seeds the own twins' noise")
     add("--settings", type=Path, metavar="FILE", help="of the own robot behind the wire, as of lira robot (.toml)")
-    add("--json", metavar="FILE", help="write the table as JSON to FILE (-: standard output)")
+    add_json(parser)
     add("--out", type=Path, metavar="DIR", help=f"folder for {PAGE} with the plots, and the logs of own processes")
 
 
@@ -128,10 +128,10 @@ def show(args: argparse.Namespace, first: "Recording", second: "Recording", rows
     """Print the table, or write it as JSON and as a page."""
     import msgspec
 
+    from lira.tools.output.machine import take_stdout, write_file
     from lira.tools.output.table import format_table
     from lira.tools.parity.compare import cells
     from lira.tools.parity.page import COLUMNS, render
-    from lira.tools.verbs.bench import take_stdout, write_file
 
     output = take_stdout() if args.json == "-" else sys.stdout
     if args.out is not None:

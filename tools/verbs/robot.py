@@ -14,25 +14,18 @@ examples:
 import argparse
 import threading
 from pathlib import Path
-from typing import TYPE_CHECKING, Protocol, cast, runtime_checkable
+from typing import TYPE_CHECKING, cast
 
 from lira.hal.errors import ConfigError, PluginError
+from lira.tools.options import add_profile, add_server
+from lira.tools.output.troubles import watch
 
 if TYPE_CHECKING:
     from lira.hal.bus.bus import Bus
     from lira.hal.port import Robot
     from lira.hal.profile import RobotProfile
 
-LOOK_S = 0.2
 ROBOT_HAS = ("profile", "open", "read", "drive", "now", "wait", "close")
-
-
-@runtime_checkable
-class Troubled(Protocol):
-    """A robot that says what is wrong with it."""
-
-    def troubles(self) -> dict[str, str]:
-        """What is lost, each with its remedy."""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -57,17 +50,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="MODULE:OBJECT",
         help="instead of a ROSbot's devices, a robot of your own: a class that is made from a profile",
     )
-    add("--profile", default="rosbot2", help="robot by name or .toml file (default: %(default)s)")
+    add_profile(parser, "rosbot2")
     add("--settings", type=Path, metavar="FILE", help="how this robot is mounted and calibrated (.toml)")
     add("--openni", type=Path, metavar="DIR", help="folder of OpenNI2's library (default: OPENNI2_REDIST)")
-    add("--name", default="rosbot", help="robot's name: every key on the bus begins with it (default: %(default)s)")
-    add(
-        "--listen",
-        default="127.0.0.1:7447",
-        metavar="HOST:PORT",
-        help="where drivers connect; 0.0.0.0:7447 lets other machines in (default: %(default)s, this machine only)",
-    )
-    add("--insecure", action="store_true", help="let other machines in without keys (see lira keys)")
+    add_server(parser)
 
 
 def run(args: argparse.Namespace) -> int:
@@ -82,8 +68,7 @@ def run(args: argparse.Namespace) -> int:
         blind = "".join(f", without {device}" for device in args.without)
         where = f"({robot.profile.name}) on {args.listen}{blind}"
         print(f"robot '{args.name}' serves {where}; stop with Ctrl-C", flush=True)
-        if isinstance(robot, Troubled):
-            threading.Thread(target=report, args=(robot, stop), daemon=True, name="status").start()
+        watch(robot, stop)
 
     serve(robot, args.name, args.listen, insecure=args.insecure, ready=ready)
     return 0
@@ -129,15 +114,3 @@ def open_own(args: argparse.Namespace) -> "Robot":
         what = f"the robot '{args.driver}' has no {', '.join(lacks)}"
         raise PluginError(what, f"A lira.Robot has: {', '.join(ROBOT_HAS)}.")
     return cast("Robot", robot)
-
-
-def report(robot: Troubled, stop: threading.Event) -> None:
-    """Say which device is lost, and when it is back."""
-    known: dict[str, str] = {}
-    while not stop.wait(LOOK_S):
-        troubles = robot.troubles()
-        for name in troubles.keys() - known.keys():
-            print(f"the robot stands: {troubles[name]}", flush=True)
-        for name in known.keys() - troubles.keys():
-            print(f"the {name} is back; the robot moves again after a zero command", flush=True)
-        known = troubles

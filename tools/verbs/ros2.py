@@ -15,9 +15,11 @@ import math
 import sys
 import threading
 import time
+from contextlib import closing
 from typing import TYPE_CHECKING
 
 from lira.hal.errors import ConfigError
+from lira.tools.options import add_profile, add_server
 
 if TYPE_CHECKING:
     from lira.hal.bus.bus import Bus
@@ -57,40 +59,30 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="another topic for scan, camera, odom, imu, battery or cmd_vel; may be given several times",
     )
     add("--lidar-yaw", type=float, default=0.0, metavar="DEG", help="how the lidar's frame is turned (ROSbot 2: 180)")
-    add("--profile", default="rosbot2", help="robot by name or .toml file (default: %(default)s)")
-    add("--name", default="rosbot", help="robot's name on our bus (default: %(default)s)")
-    add("--listen", default="127.0.0.1:7447", metavar="HOST:PORT", help="where drivers connect (default: %(default)s)")
+    add_profile(parser, "rosbot2")
+    add_server(parser)
 
 
 def run(args: argparse.Namespace) -> int:
     """Serve until told to stop."""
     from lira.hal.bus.bus import Bus
     from lira.hal.profile import load_profile
-    from lira.hal.safety.governed import GovernedRobot
-    from lira.hal.server.server import HalServer, stop_on_signal
+    from lira.hal.server.serve import serve
     from lira.robot.ros2.robot import Interface, Ros2Robot
-    from lira.tools.verbs.robot import report
+    from lira.tools.output.troubles import watch
 
     interface = Interface(topics(args.topic), args.cmd_vel == "twist_stamped", math.radians(args.lidar_yaw))
     profile = load_profile(args.profile)
-    far = Bus(args.name, connect=args.connect, prefix=args.namespace.strip("/"))
-    try:
-        near = Bus(args.name, listen=args.listen)
-        try:
-            with stop_on_signal() as stop:
-                robot = Ros2Robot(profile, far, interface)
+    with closing(Bus(args.name, connect=args.connect, prefix=args.namespace.strip("/"))) as far:
+        robot = Ros2Robot(profile, far, interface)
 
-                def ready() -> None:
-                    print(f"robot '{args.name}' (ROS 2 at {args.connect}) serves on {args.listen}", flush=True)
-                    for warning in warnings(far, stamped=interface.stamped):
-                        print(f"warning: {warning}", file=sys.stderr, flush=True)
-                    threading.Thread(target=report, args=(robot, stop), daemon=True, name="status").start()
+        def ready(_: Bus, stop: threading.Event) -> None:
+            print(f"robot '{args.name}' (ROS 2 at {args.connect}) serves on {args.listen}", flush=True)
+            for warning in warnings(far, stamped=interface.stamped):
+                print(f"warning: {warning}", file=sys.stderr, flush=True)
+            watch(robot, stop)
 
-                HalServer(GovernedRobot(robot), near, ready=ready).run(stop)
-        finally:
-            near.close()
-    finally:
-        far.close()
+        serve(robot, args.name, args.listen, insecure=args.insecure, ready=ready)
     return 0
 
 

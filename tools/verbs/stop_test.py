@@ -27,6 +27,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 
 from lira.hal.errors import ConfigError
+from lira.tools.options import add_json, add_profile, add_seed
 
 TIMES = ("fault", "n", "p50_s", "p99_s", "max_time_to_zero_s", "budget_s", "fault_to_zero_s", "distance_m")
 COLUMNS = (*TIMES, "stale_obeyed", "moved_unasked", "asked", "refused", "stopped_by", "passed")
@@ -42,15 +43,15 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     what.add_argument("--mutants", action="store_true", help="break the product on purpose: do the rows notice?")
     add("--only", metavar="WORD", default="", help="only the rows (or mutants) with this word in their name")
     add("--trials", type=int, metavar="N", help="how often each (default: as the row says; with --quick 1)")
-    add("--profile", default="rosbot2", help="robot by name or .toml file (default: %(default)s)")
-    add("--seed", type=int, default=0, help="when in the control period a fault comes (default: %(default)s)")
-    add("--json", metavar="FILE", help="write a JSON object to FILE (-: standard output)")
+    add_profile(parser, "rosbot2")
+    add_seed(parser, "when in the control period a fault comes")
+    add_json(parser)
 
 
 def run(args: argparse.Namespace) -> int:
     """Run the matrix, or the mutants."""
     from lira.tools.bench import describe_machine
-    from lira.tools.verbs.bench import take_stdout, write_file
+    from lira.tools.output.machine import take_stdout, write_file
 
     output = take_stdout() if args.json == "-" else sys.stdout
     signal.signal(signal.SIGTERM, signal.default_int_handler)  # whatever ends this ends all that it has started

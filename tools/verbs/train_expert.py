@@ -20,7 +20,7 @@ from pathlib import Path
 
 from lira.fusion.experts.tasks import DEFAULT, TASKS
 from lira.hal.errors import ConfigError, LiraError, StorageError
-from lira.tools.options import natural
+from lira.tools.options import add_seed
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -30,7 +30,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("expert", choices=EXPERTS, help="which sensor it sees")
     parser.add_argument("--task", choices=TASKS, default=DEFAULT, help="what it is for (default: %(default)s)")
     parser.add_argument("--profile", help="robot profile (default: the task's)")
-    parser.add_argument("--seed", type=natural, default=0, help="seed of everything random (default: %(default)s)")
+    add_seed(parser, "seed of everything random")
     parser.add_argument("--out", type=Path, help="checkpoint to write (default: the one that comes with the project)")
 
 

@@ -21,7 +21,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from lira.hal.errors import ConfigError
-from lira.tools.options import natural
+from lira.tools.options import add_layout, add_profile, add_seed, add_server, add_world
 
 if TYPE_CHECKING:
     from lira.hal.bus.bus import Bus
@@ -32,24 +32,18 @@ if TYPE_CHECKING:
 
 LOOK_S = 0.2
 STATUS_S = 10.0
+DRAWN = {"sketch": "sketched without pybullet", "tiny": "drawn by pybullet", "egl": "drawn by pybullet with OpenGL"}
 ECHOES = 0.5  # of the directions ahead: with less the learner refuses the scan
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
     add = parser.add_argument
-    add("--world", default="line", help="world by name or .toml file (default: %(default)s)")
-    add("--profile", default="thesis-sim", help="robot by name or .toml file (default: %(default)s)")
-    add("--name", default="rosbot", help="robot's name: every key on the bus begins with it (default: %(default)s)")
-    add(
-        "--listen",
-        default="127.0.0.1:7447",
-        metavar="HOST:PORT",
-        help="where drivers connect; 0.0.0.0:7447 lets other machines in (default: %(default)s, this machine only)",
-    )
-    add("--insecure", action="store_true", help="let other machines in without keys (see lira keys)")
-    add("--layout", type=natural, default=0, help="which random layout of the world's boxes (default: %(default)s)")
-    add("--seed", type=natural, default=0, help="seeds the sensors' noise (default: %(default)s)")
+    add_world(parser, "line")
+    add_profile(parser, "thesis-sim")
+    add_server(parser)
+    add_layout(parser, "which random layout of the world's boxes")
+    add_seed(parser, "seeds the sensors' noise")
     pace = parser.add_mutually_exclusive_group()
     pace.add_argument("--speed", type=float, default=1.0, metavar="X", help="times real time (default: %(default)g)")
     pace.add_argument("--lockstep", action="store_true", help="time passes only when the driver has answered")
@@ -66,9 +60,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     add(
         "--renderer",
-        choices=("auto", "tiny", "egl"),
+        choices=("auto", "sketch", "tiny", "egl"),
         default="auto",
-        help="what draws the camera's picture: tiny runs anywhere, egl needs OpenGL (default: %(default)s)",
+        help="what draws and measures the world: sketch runs anywhere, tiny and egl are pybullet's; auto is pybullet "
+        "where it is installed (default: %(default)s)",
     )
 
 
@@ -93,7 +88,7 @@ def run(args: argparse.Namespace) -> int:
     pace = "lockstep" if args.lockstep else "real time" if factor == 1.0 else f"{factor:g} times real time"
 
     def ready(bus: "Bus", stop: threading.Event) -> None:
-        where = f"world '{world.name}' ({profile.name}) on {args.listen}"
+        where = f"world '{world.name}' ({profile.name}, {DRAWN[twin.renderer]}) on {args.listen}"
         where += ", encrypted" if bus.encrypted else ", open to anybody there" if args.insecure else ""
         print(f"twin '{args.name}' serves {where}, {pace}; stop with Ctrl-C", flush=True)
         if not args.lockstep:  # there the driver tells how it goes

@@ -9,12 +9,14 @@ examples:
 import argparse
 from pathlib import Path
 
+from lira.tools.options import add_layout, add_profile
+
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
     parser.add_argument("name", help="world by name or .toml file")
-    parser.add_argument("--layout", type=int, default=0, help="which layout of its boxes (default: %(default)s)")
-    parser.add_argument("--profile", default="thesis-sim", help="whose camera looks (default: %(default)s)")
+    add_layout(parser, "which layout of its boxes")
+    add_profile(parser, "thesis-sim", "whose camera looks: a robot")
     parser.add_argument("--picture", required=True, type=Path, metavar="FILE.png", help="where to write the picture")
 
 

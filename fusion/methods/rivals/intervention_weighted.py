@@ -5,7 +5,8 @@ minded. There is far more of that, so IWR draws half of each batch from the inte
 just before an intervention count nothing: there the robot went wrong.
 
 Half and half is kept here by what is stored: as many of the robot's own steps as the human has given labels, drawn
-evenly from the stretch before the intervention. What is learned from is the same in the mean, and any novice can.
+evenly from the stretch before the intervention. What is learned from is the same in the mean, and any novice can. They
+are in no label log, which holds what others showed: a run that goes on draws new ones.
 """
 
 import numpy as np

@@ -22,8 +22,8 @@ START = 20  # examples before anything is predicted
 class Probe:
     """Learns from (features, action, target) and predicts targets: `targets` in [0, 1], soft ones allowed.
 
-    Inputs are the scan, the picture averaged down to 8 x 8, and two numbers about the action. The rare targets above
-    zero make up half of each batch, as in ThriftyDAgger's sampling. Predicts 0 until it has seen enough.
+    Inputs are all features, pictures averaged down to 8 x 8, and the action. The rare targets above zero make up half
+    of each batch, as in ThriftyDAgger's sampling. Predicts 0 until it has seen enough.
     """
 
     def __init__(self, seed: int) -> None:
@@ -67,6 +67,10 @@ def _network(size: int, seed: int) -> nn.Sequential:
 
 
 def _inputs(features: Features, action: Action) -> Tensor:
-    arrays = [torch.from_numpy(array) for array in sorted(features.values(), key=np.ndim)]
-    parts = [array if array.ndim == 1 else adaptive_avg_pool2d(array[None, None], PX).flatten() for array in arrays]
-    return torch.cat([*parts, torch.tensor(action, dtype=torch.float32)])
+    seen = [_flat(torch.from_numpy(array)) for array in features.values()]
+    return torch.cat([*seen, torch.tensor(action, dtype=torch.float32)])
+
+
+def _flat(array: Tensor) -> Tensor:
+    """A picture averaged down, anything else as it is."""
+    return adaptive_avg_pool2d(array[None, None], PX).flatten() if array.ndim > 1 else array

@@ -16,8 +16,8 @@ from lira.tools.experiments.measures import (
     source_rows,
 )
 from lira.tools.experiments.methods import ALL, HG_DAGGER, LIRA, USUAL
+from lira.tools.experiments.output.pictures import box_pictures, spelt
 from lira.tools.experiments.pairs import TOTAL, bounds, words
-from lira.tools.experiments.pictures import box_pictures, spelt
 from lira.tools.experiments.trial import Preset, Trial
 
 QUANTITIES = ("human_labels", "interventions")
@@ -121,7 +121,7 @@ def findings(outcomes: Outcomes, name: str) -> list[Finding]:
 
 def figures(outcomes: Outcomes) -> list[Picture]:
     """Figures 11 and 12, and the ratios."""
-    from lira.tools.experiments import plots
+    from lira.tools.experiments.output import plots
 
     pictures, rows = box_pictures(by_method(outcomes), QUANTITIES), ratios(outcomes)
     caption = "HG-DAgger over LIRA-SPF, pair by pair: medians and 95 % intervals"

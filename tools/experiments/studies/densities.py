@@ -124,7 +124,7 @@ def mid_range(labels: Sequence[Action]) -> float:
 
 def figures(outcomes: Outcomes) -> list[Picture]:
     """E.4 for each method that has experts, and E.5."""
-    from lira.tools.experiments import plots
+    from lira.tools.experiments.output import plots
 
     groups = by_method(outcomes)
     runs = len(groups[HG_DAGGER[0].name])

@@ -34,7 +34,7 @@ def alone(name: str, trial: Trial) -> tuple[LapRecord, Track]:
     """Drive the passage with one expert and nobody to help, as far as it comes."""
     expert = load_policy(f"{name}-expert", trial.profile, trial.pair)
     notes, method = Notes(), Alone(name, expert.act)
-    with simulate(trial.world, trial.profile, renderer="tiny") as robot:
+    with simulate(trial.world, trial.profile, renderer="sketch") as robot:
         course = Course(trial.profile, robot.arena.world)
         run_course(robot, robot.arena, method, None, Journal(write=notes.record), course)
     return notes.laps[0], notes.tracks[0]
@@ -138,7 +138,7 @@ def findings(outcomes: Outcomes) -> list[Finding]:
 
 def figures(outcomes: Outcomes) -> list[Picture]:
     """Training, the final drives and the experts alone from above."""
-    from lira.tools.experiments import plots
+    from lira.tools.experiments.output import plots
 
     trial = outcomes[0].trial
     tracks = {f"{name} expert alone": alone(name, trial)[1] for name in experts_of(trial.profile)}

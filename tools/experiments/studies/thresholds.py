@@ -117,7 +117,7 @@ def in_order(ours: list[float], theirs: list[int]) -> bool:
 
 def figures(outcomes: Outcomes, table: str) -> list[Picture]:
     """Buffers after two laps as bars beside the thesis's."""
-    from lira.tools.experiments import plots
+    from lira.tools.experiments.output import plots
 
     rows = summary(outcomes, table)
     names = [f"theta {theta} %, L {redundancy} %" for theta, redundancy in THESIS[table]]

@@ -58,7 +58,7 @@ def findings(outcomes: Outcomes) -> list[Finding]:
 
 def figures(outcomes: Outcomes) -> list[Picture]:
     """The first seed's final drives of every method, on one layout."""
-    from lira.tools.experiments import plots
+    from lira.tools.experiments.output import plots
 
     firsts = {method: group[0] for method, group in by_method(outcomes).items()}
     tracks = {method: track for method, first in firsts.items() if (track := final(first)) is not None}

@@ -15,7 +15,8 @@ from pathlib import Path
 from queue import SimpleQueue
 
 from lira.fusion.preprocess import Preprocessor
-from lira.hal.bus.bus import Bus, Publisher
+from lira.hal.bus.bus import Bus
+from lira.hal.bus.publisher import Publisher
 from lira.hal.bus.topics import CMD_VEL
 from lira.hal.client.remote import RemoteRobot
 from lira.hal.errors import SensorError

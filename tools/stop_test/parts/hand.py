@@ -16,7 +16,6 @@ from lira.tools.joystick.bridge import Bridge
 from lira.tools.joystick.client import TeleopClient
 from lira.tools.joystick.codes import AXES, BUTTONS, EV_ABS, EV_KEY
 from lira.tools.joystick.known_pads import PadMemory
-from lira.tools.joystick.mapping import load_mapping
 from lira.tools.stop_test.control import listen
 
 READY = "a hand by word"
@@ -27,7 +26,8 @@ CENTRE, FORWARD = 128, 0
 
 def main(name: str, endpoint: str, control_port: int) -> None:
     """Drive by word."""
-    mapping, pad = load_mapping("ps3"), PipePad()
+    pad = PipePad()
+    mapping = pad.mapping
     axis = AXES[mapping.forward.axis]
 
     def hold(button: str, down: int) -> tuple[int, int, int]:
@@ -45,7 +45,7 @@ def main(name: str, endpoint: str, control_port: int) -> None:
     bus.ask(INFO)
     watch = Bus(name, connect=endpoint, watch=True)
     client = TeleopClient(bus, watch, ANSWER_S)
-    bridge = Bridge(mapping, client, lambda: pad, PadMemory(None))
+    bridge = Bridge(client, lambda: pad, PadMemory(None))
     listen(control_port, hear)
     print(READY, flush=True)
     try:

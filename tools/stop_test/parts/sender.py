@@ -9,7 +9,8 @@ import time
 from pathlib import Path
 from typing import Any
 
-from lira.hal.bus.bus import Bus, Publisher
+from lira.hal.bus.bus import Bus
+from lira.hal.bus.publisher import Publisher
 from lira.hal.bus.topics import CMD_VEL, TELEOP
 from lira.hal.messages import Twist, is_neutral
 from lira.tools.stop_test.journal import SENDERS, JournalWriter, Sent

@@ -1,0 +1,109 @@
+"""What hears a topic: polled, so that no topic can stall another."""
+
+import time
+from dataclasses import dataclass
+from functools import partial
+from typing import Any, Generic, TypeVar
+
+import zenoh
+from zenoh import ext
+from zenoh.handlers import RingChannel
+
+from lira.hal.bus.attachment import Attachment, parse_attachment
+from lira.hal.bus.boundary import Boundary
+from lira.hal.bus.connection import Connection, Declared
+from lira.hal.bus.topics import ATTACHMENT_BYTES, BY, Topic
+from lira.hal.messages.codec import decode
+
+M = TypeVar("M")
+
+
+@dataclass(frozen=True, slots=True)
+class Received(Generic[M]):
+    """A message as it came. `arrived_s` is when it was polled, on this machine's monotonic clock.
+
+    `key` is the whole key that it came on. `sender` is the id of the session that put it, "" if that does not stamp
+    what it puts (ours and ROS bridges do).
+    """
+
+    message: M
+    attachment: Attachment | None
+    arrived_s: float
+    key: str = ""
+    sender: str = ""
+
+    @property
+    def commander(self) -> str:
+        """Whose command it is: with keys everybody commands in their own name. "" on a plain topic."""
+        return self.key.rpartition(BY)[2] if BY in self.key else ""
+
+
+class Reader(Generic[M]):
+    """Keeps the newest `depth` of a topic. What is too long or cannot be decoded is refused at the bus's `boundary`."""
+
+    def __init__(self, connection: Connection, key: str, topic: Topic[M], depth: int, boundary: Boundary) -> None:
+        self._connection = connection
+        self._topic = topic
+        self._boundary = boundary
+        self._newest: Received[M] | None = None
+        self._depth = depth
+        self.full = False  # the last poll took all that is kept, so older messages may have been lost
+        # Not by a method: what holds the subscriber is let go of with the reader, at once.
+        self._subscriber = connection.declare(partial(_subscribe, key, depth, latched=topic.qos.latched))
+
+    def poll(self) -> list[Received[M]]:
+        """Return what came since the last poll, oldest first, as far back as the reader's depth.
+
+        However fast somebody sends, it takes no more than that many, so whoever polls goes on.
+        """
+        found: list[Received[M]] = []
+        self.full = True
+        for _ in range(self._depth):
+            if (sample := take(self._connection, self._subscriber)) is None:
+                self.full = False
+                break
+            with self._boundary.guard(self._topic.key):
+                if (received := self._receive(sample)) is not None:
+                    found.append(received)
+        if found:
+            self._newest = found[-1]
+        return found
+
+    def _receive(self, sample: zenoh.Sample) -> Received[M] | None:
+        """Decode a sample. What is too long is not even copied."""
+        attached = sample.attachment
+        if len(sample.payload) > self._topic.max_bytes or (attached is not None and len(attached) > ATTACHMENT_BYTES):
+            self._boundary.refuse(self._topic.key, "too long")
+            return None
+        message = decode(self._topic.kind, bytes(sample.payload))
+        sent = parse_attachment(None if attached is None else bytes(attached))
+        return Received(message, sent, time.monotonic(), str(sample.key_expr), self._sender(sample))
+
+    def newest(self) -> Received[M] | None:
+        """Return the newest message that ever came, however old it is."""
+        self.poll()
+        return self._newest
+
+    def _sender(self, sample: zenoh.Sample) -> str:
+        """Who put it. What comes without a stamp gets one of this session."""
+        stamp = sample.timestamp
+        if stamp is None or (sender := str(stamp.get_id())) == str(self._connection.session.zid()):
+            return ""
+        return sender
+
+
+def _subscribe(key: str, depth: int, session: zenoh.Session, *, latched: bool) -> Any:
+    ring: RingChannel[zenoh.Sample] = RingChannel(depth)
+    if not latched:
+        return session.declare_subscriber(key, ring)
+    history = ext.HistoryConfig(detect_late_publishers=True, max_samples=1)
+    return ext.declare_advanced_subscriber(session, key, ring, history=history)
+
+
+def take(connection: Connection, declared: Declared[Any]) -> Any:
+    """Take the next of what came to something declared, None for nothing. Raises `BusError` once the bus is closed."""
+    try:
+        return declared.now.try_recv()
+    except zenoh.ZError as error:
+        connection.check_open(error)
+        return None  # its session is just being replaced

@@ -1,0 +1,78 @@
+"""A real trial that is taught to a quality, on a short world; and how worlds and robots are shifted for it."""
+
+import msgspec
+import numpy as np
+import pytest
+from short_trials import write_world
+
+from lira.fusion.methods.presets import METHODS
+from lira.fusion.methods.syllabus import with_proof
+from lira.fusion.teaching.teacher import PERFECT
+from lira.hal.errors import ConfigError
+from lira.hal.profile import load_profile
+from lira.sim_backend.catalogue import load_world
+from lira.sim_backend.layout import build
+from lira.tools.experiments.quality import WAYS, Quality
+from lira.tools.experiments.shifts import BENDS, BOXES, SHIFTS, shifted
+from lira.tools.experiments.trial import Trial, play
+
+TO = Quality(layouts=2, ways=WAYS, shift="noise", more=1)
+
+
+@pytest.fixture(scope="module")
+def outcome(tmp_path_factory):
+    world = write_world(tmp_path_factory.mktemp("world"))
+    plus = METHODS["plus"]
+    plus = msgspec.structs.replace(plus, syllabus=with_proof(plus.syllabus, "fresh:2"))
+    return play(Trial(plus, world, 0, "perfect", PERFECT, laps=2, unseen=1, quality=TO))
+
+
+def test_after_each_lap_fresh_layouts_are_driven_and_counted_as_long_as_a_level_can_be_reached(outcome):
+    first = outcome.points[0]
+    laps = [lap for lap in outcome.laps if lap.phase == "prove" and lap.lap == 1]
+    assert (first.lap, first.layouts, first.passed) == (1, len(laps), sum(lap.passed for lap in laps))
+    assert first.layouts == (2 if laps[0].passed else 1)
+    assert 5.0 < first.driven_m < 26.0
+    assert first.human_labels == laps[0].human_labels
+    assert outcome.after(1).phase == "train"
+
+
+def test_who_reaches_a_level_is_tried_in_every_way_and_once_more_after_the_laps_that_follow(outcome):
+    reached = any(point.reaches(0.9, TO.layouts) for point in outcome.points)
+    assert outcome.result.converged == reached  # of two layouts all levels ask for both
+    tried = [(each.levels, each.way) for each in outcome.judged]
+    assert tried == [(levels, way) for levels in ([TO.levels, ()] if reached else [()]) for way in WAYS]
+    assert all(each.layouts == 1 for each in outcome.judged)
+    assert len(outcome.points) == outcome.result.laps
+    assert not outcome.tracks
+
+
+PROFILE = load_profile("thesis-sim")
+WORLD = load_world("line-obstacles")
+
+
+@pytest.mark.parametrize("shift", SHIFTS)
+def test_every_shift_changes_something_and_leaves_a_world_that_can_be_built(shift):
+    world, profile = shifted(shift, WORLD, PROFILE)
+    assert (world, profile) != (WORLD, PROFILE)
+    assert (world == WORLD) != (profile == PROFILE)
+    assert len(build(world, 3).blocks) == 8
+
+
+def test_nothing_is_shifted_that_nobody_asked_for():
+    assert shifted(None, WORLD, PROFILE) == (WORLD, PROFILE)
+
+
+def test_boxes_grow_but_stay_as_high_and_bends_get_tighter():
+    plain, grown = build(WORLD, 3).blocks[0], build(shifted("boxes", WORLD, PROFILE)[0], 3).blocks[0]
+    assert grown.length_m == pytest.approx(BOXES * plain.length_m)
+    assert grown.height_m == plain.height_m
+    tight = build(shifted("curvature", WORLD, PROFILE)[0], 3).curve
+    assert tight.length_m == pytest.approx(BENDS * build(WORLD, 3).curve.length_m, rel=1e-3)
+    turns = [np.abs(np.diff(np.unwrap(each.headings))).max() for each in (build(WORLD, 3).curve, tight)]
+    assert turns[1] > turns[0]
+
+
+def test_bends_of_a_world_with_boxes_in_fixed_places_are_left_alone():
+    with pytest.raises(ConfigError, match="bends"):
+        shifted("curvature", load_world("corridor"), PROFILE)

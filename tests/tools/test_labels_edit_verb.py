@@ -1,0 +1,148 @@
+"""`lira labels list|undo|redo|explain|merge` on what a run leaves in its folder."""
+
+import json
+
+import numpy as np
+import pytest
+
+from lira.fusion.inference.checkpoint import load_checkpoint
+from lira.fusion.inference.kernel_net import KernelNet
+from lira.fusion.learning.kernel_novice import KernelNovice
+from lira.fusion.learning.labels import Label
+from lira.fusion.learning.novice import LearningSettings
+from lira.fusion.log.label_log import Demonstration, DemonstrationLog, read_demonstrations
+from lira.fusion.log.run_log import RunRecord, RunWriter
+from lira.fusion.policies.kernel import KernelSettings
+from lira.fusion.policies.networks import ExpertNet
+from lira.fusion.preprocess import Features
+from lira.hal.profile import load_profile
+from lira.tools.cli import main
+from lira.tools.runs.folder import LABELS, NOVICE, RECORD, snapshot
+
+SIM = load_profile("thesis-sim")
+HEAD = RunRecord("line-obstacles", SIM.name, "plus", "plus", 0, 0, "lira demo", "0")
+# Two scenes, seen again and again: in the first all but the seventh label turn left, in the second nobody turns.
+SCENES = [np.random.default_rng(k) for k in (1, 2)]
+SEEN = [Features(scan=rng.random(101, np.float32), image=rng.random((32, 32), np.float32)) for rng in SCENES]
+GIVEN = [("camera", 0, 0.9)] * 4 + [("human", 1, 0.0)] * 2 + [("camera", 0, -0.9)] + [("human", 0, 0.9)] * 3
+
+
+def labels():
+    for k, (source, scene, turn) in enumerate(GIVEN):
+        yield Demonstration(0.2 * k, k, 1, source, (1.0, turn), (0.0, 0.0), True, SEEN[scene])
+
+
+@pytest.fixture
+def folder(tmp_path):
+    trunks = KernelNet.from_experts([ExpertNet("image", (32, 32), 16, seed=1), ExpertNet("scan", (101,), seed=2)])
+    novice = KernelNovice(trunks, LearningSettings(human_weight=3.0), KernelSettings(), mirrored=True)
+    with DemonstrationLog(tmp_path / LABELS, SIM, mirrored=True) as log, RunWriter(tmp_path / RECORD) as record:
+        record.write(HEAD)
+        for label in labels():
+            log.append(label)
+            weight = novice.weight(label.source)
+            novice.remember(Label(label.features, label.action, label.source, weight))
+        said = snapshot(tmp_path, novice, SIM, HEAD)()
+    assert "this label contradicts the rest and is not followed: 6 (camera, lap 1 at 1.2 s: turn -0.90" in said
+    return tmp_path
+
+
+def turn(folder, scene):
+    network, _ = load_checkpoint(folder / NOVICE)
+    return network.act(SEEN[scene])[1]
+
+
+def lira(capsys, *words):
+    status = main(["labels", *map(str, words)])
+    return status, capsys.readouterr()
+
+
+def test_the_list_says_what_became_of_each_label(folder, capsys):
+    status, said = lira(capsys, "list", folder / LABELS)
+    assert status == 0
+    lines = said.out.splitlines()[-len(GIVEN) :]
+    assert [line.split()[0] for line in lines] == [str(k) for k in range(len(GIVEN))]
+    assert [number for number, line in enumerate(lines) if line.endswith("contradicts the rest")] == [6]
+
+
+def test_the_last_intervention_is_taken_back_and_the_novice_knows_it_no_more(folder, capsys):
+    before = turn(folder, 0)
+    status, said = lira(capsys, "undo", folder / LABELS)
+    assert (status, said.out.splitlines()[0]) == (0, "taken back: 3 labels 7-9")
+    assert "was learned anew from 7 labels; it has not been proven since" in said.out
+    assert turn(folder, 0) < before - 0.01
+    assert f"lira labels redo {folder / LABELS} --number 7-9" in said.out
+    status, said = lira(capsys, "redo", folder / LABELS)
+    assert said.out.splitlines()[0] == "learned again: 3 labels 7-9"
+    assert turn(folder, 0) == pytest.approx(before, abs=1e-3)
+
+
+def test_labels_are_taken_back_by_number_by_source_and_by_time(folder, capsys):
+    log = folder / LABELS
+
+    def stored():
+        return [number for number, each in enumerate(read_demonstrations(log)) if each.stored]
+
+    lira(capsys, "undo", log, "--number", "0-1", "4")
+    assert stored() == [2, 3, 5, 6, 7, 8, 9]
+    lira(capsys, "undo", log, "--source", "camera", "--from", "0.6")
+    assert stored() == [2, 5, 7, 8, 9]
+    lira(capsys, "undo", log, "--from", "1.6", "--to", "1.6")
+    assert stored() == [2, 5, 7, 9]
+    lira(capsys, "redo", log)
+    assert stored() == list(range(10))
+
+
+def test_what_makes_an_action_is_named_and_adds_up(folder, capsys):
+    status, said = lira(capsys, "explain", folder / LABELS, "--number", "4", "--json", "-")
+    found = json.loads(said.out)
+    assert status == 0
+    assert np.sum([part["share"] for part in found["parts"]], axis=0) == pytest.approx(found["action"])
+    likest = {part["number"] for part in found["parts"] if part["likeness"] > 0.99}
+    assert likest == {4, 5}
+    assert {part["number"] for part in found["parts"]} == set(range(10))
+    status, said = lira(capsys, "explain", folder / LABELS, "--time", "0.81")
+    assert said.out.startswith("label 4 (run 0, lap 1, 0.8 s) says +1.00, +0.00 by human; the novice does +")
+
+
+def test_two_logs_become_one(folder, capsys, tmp_path):
+    status, said = lira(capsys, "merge", folder / LABELS, folder / LABELS, "-o", tmp_path / "both.lira")
+    assert status == 0
+    assert "10 labels; 10 of them are in both, and kept once" in said.out
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        ["undo", "LOG", "--number", "10"],
+        ["undo", "LOG", "--number", "7-3"],
+        ["undo", "LOG", "--source", "lidar"],
+        ["undo", "LOG", "LOG"],
+        ["explain", "LOG"],
+        ["explain", "LOG", "--number", "1", "--time", "3"],
+        ["explain", "LOG", "--number", "1-2"],
+        ["explain", "LOG", "--time", "3", "--run", "5"],
+        ["merge", "LOG", "-o", "x"],
+        ["merge", "LOG", "LOG"],
+        ["list", "NONE"],
+    ],
+)
+def test_what_makes_no_sense_changes_nothing_and_says_why(folder, capsys, words):
+    before = (folder / LABELS).read_bytes()
+    names = {"LOG": folder / LABELS, "NONE": folder / "none.lira"}
+    try:
+        status, said = lira(capsys, *(names.get(word, word) for word in words))
+    except SystemExit as end:
+        status, said = end.code, capsys.readouterr()
+    assert status == 2
+    assert said.err
+    assert (folder / LABELS).read_bytes() == before
+
+
+def test_a_network_cannot_tell_but_its_labels_are_taken_back_all_the_same(folder, capsys):
+    (folder / NOVICE).unlink()
+    status, said = lira(capsys, "undo", folder / LABELS)
+    assert status == 0
+    assert "one that goes on with it learns it anew" in said.out
+    status, said = lira(capsys, "explain", folder / LABELS, "--number", "1")
+    assert status == 2

@@ -1,0 +1,157 @@
+"""One voice: every situation in one table, what comes before what, and that there are words for all of them."""
+
+import string
+from dataclasses import replace
+
+import pytest
+
+from lira.hal.errors import ConfigError
+from lira.hal.messages import (
+    STOP,
+    Applied,
+    BatteryState,
+    CourseState,
+    Decision,
+    ExpertView,
+    LabelCounts,
+    OperatorAnswer,
+    Reason,
+    Request,
+    Source,
+    Twist,
+)
+from lira.tools.joystick.deadman import State
+from lira.tools.operator.situation import HAND_DRIVES, STANDING, URGENCY, Situation, Urgency, situation_of
+from lira.tools.operator.view import View, battery_share
+from lira.tools.operator.voice import explain, languages, speak, verdict, vocabulary
+
+EXPERTS = (ExpertView("camera", (1.0, 0.5), 0.16, True), ExpertView("lidar", (0.7, -0.6), 0.01, False))
+DECIDED = Decision(
+    1.0, 3, "camera", "attention", (0.8, 0.5), (0.1, 0.0), None, EXPERTS, 0.06, LabelCounts(1, 2, 3, 4, 5), 2, 3, 4
+)
+BY_POLICY = Applied(Twist(0.4, 0.2), 1.0, Source.POLICY, Reason.OK)
+BY_HAND = replace(BY_POLICY, source=Source.TELEOP)
+VIEW = View("rosbot", applied=BY_POLICY, link_age_s=0.02, decision=DECIDED, decision_age_s=0.1)
+PAUSED = replace(VIEW, answer=OperatorAnswer(1.0, paused=True, count=2, words="paused"), answer_age_s=0.1)
+TRUTH = CourseState(1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 3.0, 0.1, 1.0)
+
+
+def decided(**words):
+    return replace(VIEW, decision=replace(DECIDED, **words))
+
+
+def held(reason, clamps=(), **words):
+    return replace(VIEW, applied=Applied(STOP, 1.0, Source.NONE, reason, clamps), **words)
+
+
+def on_course(**words):
+    return replace(VIEW, truth=replace(TRUTH, **words), truth_age_s=0.05)
+
+
+NEW = {"training_steps": 0, "labels": LabelCounts()}
+CASES = [
+    (replace(VIEW, estop=True), "estop"),
+    (replace(VIEW, estop=True, confirmed=True), "estop_confirmed"),
+    (replace(VIEW, estop=True, link_age_s=9.0), "estop"),
+    (View("rosbot"), "no_link"),
+    (replace(VIEW, link_age_s=3.0), "no_link"),
+    (replace(VIEW, applied=BY_HAND), "person"),
+    (replace(decided(human=(0.5, 0.0)), applied=BY_HAND), "person_slow"),
+    (replace(decided(human=(1.0, 0.0)), applied=BY_HAND), "person"),
+    (replace(decided(human=(-0.5, 0.0)), applied=BY_HAND), "person"),
+    (replace(PAUSED, applied=BY_HAND), "person_paused"),
+    (PAUSED, "paused"),
+    (replace(PAUSED, answer_age_s=9.0), "one_expert"),
+    (on_course(collided=True), "collided"),
+    (on_course(lost=True), "strayed"),
+    (on_course(finished=True), "finished"),
+    (replace(on_course(collided=True), applied=BY_HAND), "person"),
+    (replace(on_course(collided=True), truth_age_s=5.0), "one_expert"),
+    (held(Reason.NO_COMMAND), "no_command"),
+    (held(Reason.STALE), "stale"),
+    (held(Reason.STALE, decision=None), "no_command"),
+    (held(Reason.STALE, ("no_lidar",)), "device_lost"),
+    (held(Reason.NEUTRAL_FIRST), "neutral_first"),
+    (held(Reason.NEUTRAL_FIRST, hand=State.DRIVING), "neutral_held"),
+    (held(Reason.REFUSED), "refused"),
+    (held(Reason.OBSTACLE), "obstacle"),
+    (held(Reason.OK), "told_to_stand"),
+    (replace(VIEW, applied=replace(BY_POLICY, reason=Reason.OBSTACLE)), "obstacle"),
+    (decided(driver="human", call="feedback", **NEW), "waits"),
+    (decided(driver="human", call="feedback"), "unknown"),
+    (decided(driver="novice", call="feedback"), "disagree"),
+    (decided(driver="shield", call="none"), "shield"),
+    (decided(driver="shield", call="feedback"), "shield_stands"),
+    (decided(driver="novice", call="none"), "novice"),
+    (decided(driver="novice", call="none", phase="prove"), "proving"),
+    (decided(driver="novice", call="none", phase="unseen"), "proving"),
+    (decided(driver="mean", call="none"), "mean"),
+    (decided(), "one_expert"),
+    (decided(call="none"), "expert"),
+    (replace(VIEW, decision=None), "policy"),
+    (replace(VIEW, decision_age_s=2.0), "policy"),
+]
+
+
+@pytest.mark.parametrize(("view", "situation"), CASES, ids=[f"{k}-{name}" for k, (_, name) in enumerate(CASES)])
+def test_every_situation_is_told_from_the_others(view, situation):
+    assert situation_of(view) is Situation(situation)
+
+
+def test_no_situation_is_left_out_of_the_cases_above():
+    assert {name for _, name in CASES} == set(Situation)
+
+
+def test_every_reason_of_the_governor_has_a_situation():
+    assert set(STANDING) == set(Reason)
+    assert HAND_DRIVES == State.DRIVING
+
+
+@pytest.mark.parametrize("language", languages())
+def test_every_language_has_words_for_every_situation(language):
+    words = vocabulary(language)
+    assert set(words) == set(Situation)
+    known = {"expert", "age", "lost"}
+    for said in words.values():
+        for line in (said.who, said.why, said.now):
+            assert line
+            assert {name for _, name, _, _ in string.Formatter().parse(line) if name} <= known
+
+
+def test_a_language_that_is_not_there_is_an_error_with_those_that_are():
+    with pytest.raises(ConfigError, match=r"Choose one of: .*en"):
+        speak(VIEW, "xx")
+
+
+def test_what_needs_a_person_says_what_to_do_with_a_hand():
+    for situation, said in vocabulary("en").items():
+        if URGENCY[situation] is Urgency.NEED:
+            assert any(what in said.now for what in ("dead-man", "Hold", "sticks")), situation
+
+
+def test_words_name_the_expert_the_devices_and_who_commands():
+    assert speak(VIEW).who == "EXPERT CAMERA"
+    assert "lidar" in speak(held(Reason.STALE, ("no_lidar",), decision=None)).why
+    assert " for 3 s" in speak(replace(VIEW, link_age_s=3.0)).why
+    assert speak(replace(VIEW, applied=replace(BY_HAND, commander="anna"))).why.startswith("anna: ")
+
+
+@pytest.mark.parametrize("reason", Reason)
+def test_a_terminal_is_told_why_the_robot_stands_and_what_to_do(reason):
+    line = explain(Applied(STOP, 1.0, Source.NONE, reason))
+    assert "\n" not in line
+    assert len(line) > 30
+
+
+def test_what_became_of_a_request_is_told_while_it_is_news():
+    fresh = replace(PAUSED, verdict_age_s=0.1)
+    refused = replace(fresh, answer=replace(fresh.answer, accepted=False))
+    assert (verdict(fresh), verdict(refused)) == (("paused", True), ("paused", False))
+    assert verdict(replace(fresh, verdict_age_s=60.0)) == ("", None)
+    assert verdict(replace(fresh, unanswered=Request.SAVE))[1] is False
+    assert verdict(VIEW) == ("nobody takes requests: start lira fusion", None)
+    assert verdict(replace(VIEW, link_age_s=9.0)) == ("", None)
+
+
+def test_the_battery_is_between_empty_and_full():
+    assert [battery_share(BatteryState(0.0, volts)) for volts in (5.0, 11.4, 13.0)] == pytest.approx([0.0, 0.5, 1.0])

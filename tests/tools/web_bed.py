@@ -1,0 +1,130 @@
+"""A robot on the bus, a policy that drives it, `lira web`, and a real browser that looks at its page."""
+
+import contextlib
+import os
+import shutil
+import sys
+import threading
+import time
+
+import pytest
+
+from lira.hal.bus.bus import Bus
+from lira.hal.bus.topics import APPLIED
+from lira.hal.client.remote import RemoteRobot
+from lira.hal.messages import STOP, Command, Source, Twist
+from lira.tools.bench import null_robot
+from lira.tools.launch.processes import ChildProcess, free_port, lira_command
+
+NEEDED = ("chromium", "chromedriver")
+missing = [name for name in NEEDED if shutil.which(name) is None]
+needs_browser = pytest.mark.skipif(bool(missing), reason=f"needs {' and '.join(missing)} (Debian)")
+
+
+@contextlib.contextmanager
+def policy(name, endpoint):
+    """Drives on and on, and never asks a robot that has stopped to move again: that is for a person."""
+    stop, bus = threading.Event(), Bus(name, connect=endpoint)
+    robot = RemoteRobot(bus)
+    robot.open()
+
+    def drive():
+        robot.drive(Command(STOP, robot.now(), answers=robot.read().seq))
+        while not stop.is_set():
+            robot.drive(Command(Twist(0.3, 0.0), robot.now(), answers=robot.read().seq))
+            robot.wait(robot.now() + robot.profile.period_s)
+
+    thread = threading.Thread(target=drive)
+    thread.start()
+    try:
+        yield
+    finally:
+        stop.set()
+        thread.join()
+        robot.close()
+        bus.close()
+
+
+@contextlib.contextmanager
+def page_of_robot(folder, *, with_policy=True):
+    """The bus, the page's address, and `lira web` as a process."""
+    name, endpoint, port = f"web{os.getpid()}", f"127.0.0.1:{free_port()}", free_port()
+    robot = [sys.executable, "-m", "lira.tools.bench.null_robot", name, endpoint]
+    with contextlib.ExitStack() as stack:
+        server = stack.enter_context(ChildProcess("the robot", robot, folder / "robot.log"))
+        server.wait_ready(null_robot.READY, 30.0)
+        bus = Bus(name, connect=endpoint)
+        stack.callback(bus.close)
+        if with_policy:
+            stack.enter_context(policy(name, endpoint))
+        words = ["--name", name, "--connect", endpoint, "--port", str(port)]
+        web = stack.enter_context(ChildProcess("lira web", lira_command("web", *words), folder / "web.log"))
+        web.wait_ready("web shows", 30.0)
+        yield bus, f"http://127.0.0.1:{port}", web
+
+
+@contextlib.contextmanager
+def browser(*, width=1366, height=768):
+    """Chromium without a screen. `script` of a page may be given by `tell_at_start`."""
+    from selenium import webdriver
+    from selenium.webdriver.chrome.service import Service
+
+    options = webdriver.ChromeOptions()
+    options.binary_location = shutil.which("chromium")
+    options.set_capability("goog:loggingPrefs", {"browser": "ALL"})
+    for flag in ("--headless=new", "--no-sandbox", "--disable-gpu", "--disable-dev-shm-usage"):
+        options.add_argument(flag)
+    options.add_argument(f"--window-size={width},{height}")
+    driver = webdriver.Chrome(options=options, service=Service(shutil.which("chromedriver")))
+    try:
+        yield driver
+    finally:
+        with contextlib.suppress(Exception):
+            driver.quit()
+
+
+def wait_until(condition, timeout_s=15.0, what=""):
+    """Whatever the condition returns once it is true."""
+    until_s = time.monotonic() + timeout_s
+    while not (found := condition()):
+        assert time.monotonic() < until_s, what or condition
+        time.sleep(0.02)
+    return found
+
+
+class Applied:
+    """What the robot was told, as it says so itself: every motion with its time and whose command it was."""
+
+    def __init__(self, bus):
+        self._reader = bus.reader(APPLIED, depth=4096)
+        self.all = []
+
+    def listen(self, duration_s=0.0):
+        until_s = time.monotonic() + duration_s
+        while True:
+            self.all += [received.message for received in self._reader.poll()]
+            if time.monotonic() >= until_s:
+                return self.all
+            time.sleep(0.02)
+
+    def forget(self):
+        self.listen()
+        self.all = []
+
+    def by_hand(self):
+        """Whether a hand moves it now."""
+        self.listen()
+        return bool(self.all) and is_by_hand(self.all[-1])
+
+    def zero_after_s(self):
+        """From the last command of the hand that moved it until it had zero, on the robot's clock."""
+        moving = [index for index, each in enumerate(self.all) if is_by_hand(each)]
+        last = self.all[moving[-1]]
+        given_s = last.stamp_s - last.command_age_s
+        zero = next(each for each in self.all[moving[-1] + 1 :] if not each.twist.linear_m_s)
+        return zero.stamp_s - given_s
+
+
+def is_by_hand(applied):
+    """Whether this is a motion that a hand asked for."""
+    return applied.source is Source.TELEOP and abs(applied.twist.linear_m_s) > 0.05

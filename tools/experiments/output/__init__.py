@@ -1,0 +1,1 @@
+"""What becomes of outcomes: a summary, a page with drawings, the documents."""

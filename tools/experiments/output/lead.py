@@ -1,0 +1,139 @@
+"""What RESULTS.md leads with: how much of a person it takes until a novice drives where it has never been."""
+
+from collections.abc import Sequence
+from functools import partial
+from pathlib import Path
+
+from lira.hal.config import write_whole
+from lira.tools.bench import cell
+from lira.tools.experiments.experiment import Picture, Row
+from lira.tools.experiments.output.markdown import table
+from lira.tools.experiments.output.summary import Summary
+
+LED_BY = "unseen"
+PARTS = "ablation"
+PICTURE = "docs/results/unseen-human_labels.svg"
+HEAD = """# Results
+
+How much of a person it takes until a novice drives, alone, where nobody has taught it. Made by a command, so do not
+edit it; how it is measured: [tools/experiments](tools/experiments/README.md).
+
+```
+make results SEEDS=10 WORKERS=2     # plays every trial that is missing, writes the summaries and these pages
+lira experiment results             # these pages alone, from the summaries that are there
+```
+"""
+NOT_YET = "\nThe experiment `unseen` has not been played yet: `lira experiment unseen --seeds 10`.\n"
+EFFORT = """
+After each training lap the novice alone drives 12 fresh layouts. Effort to 90 % is what a method had taken when 11 of
+them were passed; who did not get there within the cap of laps is censored, and counts with what it had used. Unseen:
+12 other layouts a run, which decided nothing, driven by the novice that had just reached 90 %, without any protection.
+Ratios are the method's effort over that of `plus`, pair by pair of one seed: medians, 95 % bootstrap intervals.
+"""
+DEPLOYED = """
+The same novices on the same 12 layouts, as they are, behind the protective field, behind the shield, and with somebody
+to ask: layouts passed, and collisions.
+"""
+ELSEWHERE = """
+The same where the world, the teacher, or the robot is another one than so far; a shift is applied when the novice is
+tried, not while it is taught.
+"""
+
+
+def lead(summaries: Sequence[Summary]) -> str:
+    """Return the first part of the page."""
+    found = {each.name: each for each in summaries}
+    main = found.get(LED_BY)
+    if main is None:
+        return HEAD + NOT_YET
+    elsewhere = [each for name, each in found.items() if name.startswith(f"{LED_BY}-")]
+    parts = [
+        HEAD,
+        f"\n`{main.command}`: {main.trials} trials; all tables are in [unseen](docs/results/unseen.md).\n{EFFORT}\n",
+        table(effort(main)),
+        f"\n![Layouts passed against human labels]({PICTURE})\n" if main.curves else "",
+        f"\n## Deployed\n{DEPLOYED}\n" + table(deployed(main)),
+    ]
+    if elsewhere:
+        parts.append(f"\n## Elsewhere\n{ELSEWHERE}\n" + table([row for each in elsewhere for row in condition(each)]))
+    if PARTS in found and found[PARTS].quality:
+        parts.append(
+            f"\n## What each part of plus is worth\n\n`{found[PARTS].command}`\n\n" + table(effort(found[PARTS]))
+        )
+    return "".join(parts)
+
+
+def effort(summary: Summary) -> list[Row]:
+    """One row per method, its pairs of experts together where there are several."""
+    rows = next((each.rows for each in summary.tables if each.title.startswith("Effort")), [])
+    return [
+        {
+            "method": row["method"],
+            "runs": row["n"],
+            "censored": row["censored"],
+            "labels: median, 90 %, worst": spread(row, "human_labels"),
+            "interventions": spread(row, "interventions"),
+            "demonstration": row["demonstration"],
+            "hand, s": row["human_s"],
+            "unseen passed": passed(row),
+            "collisions per 100 m": row["collisions_100m"],
+            "labels over plus": ratio(summary, row, "human_labels"),
+            "interventions over plus": ratio(summary, row, "interventions"),
+        }
+        for row in rows
+    ]
+
+
+def deployed(summary: Summary) -> list[Row]:
+    """One row per method, a column per way."""
+    found: dict[object, Row] = {}
+    for row in next((each.rows for each in summary.tables if each.title.startswith("Deployed")), []):
+        words = f"{row['unseen_passed']} of {row['unseen_laps']}, {row['collisions']}"
+        found.setdefault(row["method"], {"method": row["method"]})[str(row["deployed"])] = words
+    return list(found.values())
+
+
+def condition(summary: Summary) -> list[Row]:
+    """A line per method of an experiment that differs from the first one in what its name says."""
+    return [
+        {
+            "where": f"[{summary.name.removeprefix(f'{LED_BY}-')}](docs/results/{LED_BY}.md#{summary.name})",
+            **{key: row[key] for key in ("method", "runs", "censored", "labels: median, 90 %, worst", "interventions")},
+            "unseen passed": row["unseen passed"],
+            "collisions per 100 m": row["collisions per 100 m"],
+        }
+        for row in effort(summary)
+    ]
+
+
+def spread(row: Row, quantity: str) -> str:
+    """Median, 90 % quantile and worst."""
+    return f"{cell(row[quantity])}, {cell(row[f'{quantity}_90'])}, {cell(row[f'{quantity}_max'])}"
+
+
+def passed(row: Row) -> str:
+    """Layouts passed, with the share's interval in percent."""
+    if not row["unseen_laps"]:
+        return "none came so far"
+    low, high = (100.0 * float(str(row[key])) for key in ("share_low", "share_high"))
+    return f"{row['unseen_passed']} of {row['unseen_laps']} [{low:.0f}, {high:.0f}] %"
+
+
+def ratio(summary: Summary, of: Row, quantity: str) -> str:
+    """A method's ratio in words; nothing for what all are compared with."""
+    for row in summary.ratios:
+        if (row["against"], row["quantity"], row.get("quality")) == (of["method"], quantity, of["quality"]):
+            return f"{row['median']:.2g} [{row['low']:.2g}, {row['high']:.2g}]"
+    return ""
+
+
+def draw(summaries: Sequence[Summary], folder: Path) -> None:
+    """Draw the curves that the page shows, beside it."""
+    from lira.tools.experiments.output import plots
+    from lira.tools.experiments.output.page import render
+
+    for summary in summaries:
+        if summary.name == LED_BY and summary.curves:
+            rows = [row for row in summary.curves if row["quantity"] == "human_labels"]
+            _, svg = render(Picture("curves", "", partial(plots.curves, rows)))
+            write_whole(folder / PICTURE, svg, folder=True)

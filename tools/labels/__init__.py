@@ -1,0 +1,1 @@
+"""What `lira labels` does with a log of labels."""

@@ -1,0 +1,96 @@
+"""A log of labels in words: tables for a person, rows for JSON."""
+
+from collections.abc import Collection, Sequence
+from typing import Any
+
+from lira.fusion.learning.learned_policy import Part
+from lira.fusion.log.label_file import Demonstration
+from lira.tools.output.table import format_table
+
+LISTED = ("number", "run", "lap", "time", "source", "speed, turn", "novice's", "")
+EXPLAINED = ("number", "run", "lap", "time", "source", "says speed, turn", "likeness", "adds to speed", "adds to turn")
+SHOWN = 10
+
+
+def state(label: Demonstration, aside: bool) -> str:
+    """What became of a label."""
+    if label.undone:
+        return "taken back"
+    if not label.stored:
+        return "redundant or objected to"
+    return "contradicts the rest" if aside else "learned"
+
+
+def pair(action: tuple[float, float]) -> str:
+    """Speed and turn."""
+    return f"{action[0]:+.2f}, {action[1]:+.2f}"
+
+
+def list_rows(labels: Sequence[Demonstration], aside: Collection[int]) -> list[dict[str, Any]]:
+    """All labels, for JSON."""
+    return [
+        {
+            "number": number,
+            "run": label.run,
+            "lap": label.lap,
+            "stamp_s": label.stamp_s,
+            "source": label.source,
+            "action": label.action,
+            "novice": label.novice,
+            "state": state(label, number in aside),
+        }
+        for number, label in enumerate(labels)
+    ]
+
+
+def list_table(rows: Sequence[dict[str, Any]]) -> str:
+    """The same for a person."""
+    cells = [
+        [
+            *(str(row[name]) for name in ("number", "run", "lap")),
+            f"{row['stamp_s']:.1f} s",
+            row["source"],
+            pair(row["action"]),
+            pair(row["novice"]),
+            row["state"],
+        ]
+        for row in rows
+    ]
+    return format_table(LISTED, cells)
+
+
+def part_rows(parts: Sequence[Part], learned: Sequence[int], labels: Sequence[Demonstration]) -> list[dict[str, Any]]:
+    """What makes an action, for JSON; `learned` are the numbers that the parts' labels have in the log."""
+    return [
+        {
+            "number": learned[part.number],
+            "run": labels[learned[part.number]].run,
+            "lap": labels[learned[part.number]].lap,
+            "stamp_s": labels[learned[part.number]].stamp_s,
+            "source": part.source,
+            "action": part.action,
+            "likeness": part.likeness,
+            "share": part.share,
+        }
+        for part in parts
+    ]
+
+
+def part_table(rows: Sequence[dict[str, Any]]) -> str:
+    """The largest of them for a person, and the sum of the rest."""
+    cells = [
+        [
+            *(str(row[name]) for name in ("number", "run", "lap")),
+            f"{row['stamp_s']:.1f} s",
+            row["source"],
+            pair(row["action"]),
+            f"{row['likeness']:.2f}",
+            *(f"{share:+.3f}" for share in row["share"]),
+        ]
+        for row in rows[:SHOWN]
+    ]
+    rest = rows[SHOWN:]
+    if rest:
+        sums = [f"{sum(row['share'][k] for row in rest):+.3f}" for k in (0, 1)]
+        cells.append([f"{len(rest)} others", *[""] * 6, *sums])
+    return format_table(EXPLAINED, cells)

@@ -1,0 +1,158 @@
+"""What a person at the robot is faced with, as one of few situations. Pure, and one place for all screens and pads.
+
+The first of these rules that holds decides: who must act comes before who drives.
+
+| what is so | situation |
+|---|---|
+| the emergency stop is pressed | estop, estop_confirmed |
+| nothing is heard of the robot | no_link |
+| the dead-man is held | person; slowly: person_slow; paused: person_paused |
+| a request paused it | paused |
+| a twin's lap is over | collided, strayed, finished |
+| the governor lets nothing through | its reason |
+| the policy stands and waits for a person | waits, unknown |
+| experts disagree | disagree |
+| a policy drives | who it is |
+"""
+
+from enum import StrEnum
+
+from lira.hal.messages import Applied, Decision, Reason, Source
+from lira.tools.operator.view import View
+
+HAND_DRIVES = "driving"
+SLOW = 0.6  # of full speed: who drives so, all the time, teaches slowness
+
+
+class Situation(StrEnum):
+    """What is to be said; the words are in `words/`."""
+
+    ESTOP = "estop"
+    ESTOP_CONFIRMED = "estop_confirmed"
+    NO_LINK = "no_link"
+    PERSON = "person"
+    PERSON_SLOW = "person_slow"
+    PERSON_PAUSED = "person_paused"
+    PAUSED = "paused"
+    COLLIDED = "collided"
+    STRAYED = "strayed"
+    FINISHED = "finished"
+    DEVICE_LOST = "device_lost"
+    STALE = "stale"
+    NEUTRAL_FIRST = "neutral_first"
+    NEUTRAL_HELD = "neutral_held"
+    REFUSED = "refused"
+    OBSTACLE = "obstacle"
+    NO_COMMAND = "no_command"
+    TOLD_TO_STAND = "told_to_stand"
+    WAITS = "waits"
+    UNKNOWN = "unknown"
+    DISAGREE = "disagree"
+    ONE_EXPERT = "one_expert"
+    SHIELD = "shield"
+    SHIELD_STANDS = "shield_stands"
+    PROVING = "proving"
+    NOVICE = "novice"
+    MEAN = "mean"
+    EXPERT = "expert"
+    POLICY = "policy"
+
+
+class Urgency(StrEnum):
+    """How loud it is, the loudest last."""
+
+    IDLE = "idle"  # it stands as it was told
+    CALM = "calm"  # somebody drives
+    WATCH = "watch"  # look at the robot
+    ASK = "ask"  # your decision
+    NEED = "need"  # it stands, and goes on only if you act
+    ALARM = "alarm"  # the emergency stop is pressed, or nothing is known of the robot
+
+
+_S = Situation
+URGENCY: dict[Situation, Urgency] = {
+    **dict.fromkeys(Situation, Urgency.CALM),
+    **dict.fromkeys((_S.ESTOP, _S.ESTOP_CONFIRMED, _S.NO_LINK), Urgency.ALARM),
+    **dict.fromkeys((_S.STALE, _S.NEUTRAL_FIRST, _S.NEUTRAL_HELD, _S.REFUSED, _S.DEVICE_LOST), Urgency.NEED),
+    **dict.fromkeys((_S.COLLIDED, _S.STRAYED, _S.WAITS, _S.OBSTACLE, _S.UNKNOWN, _S.SHIELD_STANDS), Urgency.NEED),
+    **dict.fromkeys((_S.DISAGREE,), Urgency.ASK),
+    **dict.fromkeys((_S.ONE_EXPERT, _S.SHIELD), Urgency.WATCH),
+    **dict.fromkeys((_S.PAUSED, _S.FINISHED, _S.NO_COMMAND, _S.TOLD_TO_STAND), Urgency.IDLE),
+}
+
+STANDING: dict[Reason, Situation] = {
+    Reason.OK: _S.TOLD_TO_STAND,
+    Reason.NO_COMMAND: _S.NO_COMMAND,
+    Reason.STALE: _S.STALE,
+    Reason.NEUTRAL_FIRST: _S.NEUTRAL_FIRST,
+    Reason.REFUSED: _S.REFUSED,
+    Reason.OBSTACLE: _S.OBSTACLE,
+    Reason.ESTOP: _S.ESTOP,
+}
+
+
+def situation_of(view: View) -> Situation:
+    """Which situation this is, by the table above."""
+    if view.estop:
+        return _S.ESTOP_CONFIRMED if view.confirmed else _S.ESTOP
+    applied = view.applied
+    if applied is None or not view.linked:
+        return _S.NO_LINK
+    if applied.source is Source.TELEOP:
+        return _S.PERSON_PAUSED if view.paused else _S.PERSON_SLOW if _is_slow(view) else _S.PERSON
+    if view.paused:
+        return _S.PAUSED
+    standing = standing_of(applied, view.hand, decides=view.decision is not None)
+    return _lap_over(view) or standing or _driving(view.deciding)
+
+
+def lost_devices(applied: Applied) -> tuple[str, ...]:
+    """Which devices the governor misses, by name."""
+    return tuple(clamp.removeprefix("no_") for clamp in applied.clamps if clamp.startswith("no_"))
+
+
+def _is_slow(view: View) -> bool:
+    """Whether the hand drives straight on at part of the speed that the experts drive at."""
+    decision = view.deciding
+    if decision is None or decision.human is None or not decision.experts:
+        return False
+    fastest = max(expert.action[0] for expert in decision.experts)
+    return 0.0 < decision.human[0] < SLOW * fastest
+
+
+def _lap_over(view: View) -> Situation | None:
+    truth = view.course
+    if truth is None:
+        return None
+    ends = ((truth.collided, _S.COLLIDED), (truth.lost, _S.STRAYED), (truth.finished, _S.FINISHED))
+    return next((situation for over, situation in ends if over), None)
+
+
+def standing_of(applied: Applied, hand: str | None = None, *, decides: bool = True) -> Situation | None:
+    """Why the governor lets nothing through, None if it does. `decides`: somebody was heard who makes decisions."""
+    if applied.source is not Source.NONE and applied.reason is Reason.OK:
+        return None
+    if applied.reason is Reason.STALE and lost_devices(applied):
+        return _S.DEVICE_LOST
+    if applied.reason is Reason.STALE and not decides:
+        return _S.NO_COMMAND  # a hand has let go, and there is nobody to go on
+    if applied.reason is Reason.NEUTRAL_FIRST and hand == HAND_DRIVES:
+        return _S.NEUTRAL_HELD
+    return STANDING[applied.reason]
+
+
+def _driving(decision: Decision | None) -> Situation:
+    """Which policy drives, and why it is that one."""
+    if decision is None:
+        return _S.POLICY
+    if decision.driver == "shield":
+        return _S.SHIELD_STANDS if decision.call == "feedback" else _S.SHIELD
+    if decision.call == "feedback":
+        if decision.driver in ("nobody", "human"):
+            return _S.WAITS if decision.training_steps == 0 and not decision.labels.demonstration else _S.UNKNOWN
+        return _S.DISAGREE
+    if decision.phase in ("prove", "unseen"):
+        return _S.PROVING
+    if decision.driver in ("novice", "mean"):
+        return Situation(decision.driver)
+    return _S.ONE_EXPERT if decision.call == "attention" else _S.EXPERT

@@ -1,0 +1,116 @@
+"""A page in the browser to watch, teach and drive the robot: on this machine, a tablet or a phone.
+
+It opens on this machine alone. With --listen it is reached from others, over TLS and by links that let one browser in:
+that needs keys (lira keys), since whoever has the page drives the robot. Press Enter for new links.
+
+The page's thumb is a hand like any other: hold the dead-man to drive; a page that is hidden, closed or cut off has let
+go, and the robot stands. Everybody who looks can press the emergency stop.
+
+examples:
+  lira web                                     http://127.0.0.1:8080
+  lira web --connect 192.168.1.20:7447         a robot on another machine
+  lira web --listen 0.0.0.0                    for a phone: shows two links as QR codes, to drive and to look
+  lira web --screenshot page.png               a picture of a sample drive, by the browser that is installed
+"""
+
+import argparse
+import asyncio
+import contextlib
+import sys
+import threading
+import time
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from lira.tools.launch.lifetime import CLOSE_S, stop_or_interrupt
+
+if TYPE_CHECKING:
+    from lira.tools.web.access import Access
+
+ANSWER_S = 10.0
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the arguments."""
+    add = parser.add_argument
+    add("--name", default="rosbot", help="the robot's name on the bus (default: %(default)s)")
+    add("--connect", default="127.0.0.1:7447", metavar="HOST:PORT", help="where the robot is (default: %(default)s)")
+    add("--listen", default="127.0.0.1", metavar="HOST", help="where the page is served (default: %(default)s)")
+    add("--port", type=_port, default=8080, help="0 takes any that is free (default: %(default)s)")
+    add("--layout", type=int, default=0, help="the twin's layout, for the map (default: %(default)s)")
+    add("--screenshot", type=Path, metavar="FILE", help="write a picture of the page with a sample drive, and end")
+
+
+def _port(text: str) -> int:
+    if not text.isdecimal() or not 0 <= int(text) < 65536:
+        raise argparse.ArgumentTypeError(f"'{text}' is no port: 0 to 65535")
+    return int(text)
+
+
+def run(args: argparse.Namespace) -> int:
+    """Serve until stopped."""
+    if args.screenshot is not None:
+        from lira.tools.web.screenshot import save_page
+
+        save_page(args.screenshot)
+        print(f"written: {args.screenshot}")
+        return 0
+
+    from lira.hal.bus.bus import Bus
+    from lira.hal.bus.keys import keys_from_environment
+    from lira.hal.bus.services import LOCKSTEP, info_from_json
+    from lira.hal.bus.topics import INFO
+    from lira.tools.joystick.client import TeleopClient
+    from lira.tools.operator.listen import Ears
+    from lira.tools.web.access import Access, own_names, tls_context
+    from lira.tools.web.controls import Controls
+    from lira.tools.web.seat import Seat
+    from lira.tools.web.server import PageServer, serve_page
+    from lira.tools.web.settings import settings_of
+
+    tls = tls_context(keys_from_environment(), args.listen)
+    access = Access(open_here=tls is None, hosts=own_names(args.listen))
+    with contextlib.ExitStack() as stack:
+        bus = Bus(args.name, connect=args.connect)
+        stack.callback(bus.close, CLOSE_S)
+        stop = stack.enter_context(stop_or_interrupt())
+        info = info_from_json(bus.ask(INFO, timeout_s=ANSWER_S))
+        watch = Bus(args.name, connect=args.connect, watch=True)
+        stack.callback(watch.close, CLOSE_S)
+        ears, seat = Ears(watch, info.profile), Seat()
+        controls = None
+        if info.mode != LOCKSTEP:  # no hand follows lockstep
+            controls = Controls(TeleopClient(bus, watch, ANSWER_S), seat)
+            stack.callback(controls.close)
+        settings = partial(settings_of, info, args.name, args.layout)
+        server = PageServer(ears.look, seat, access, controls, settings)
+        tell = partial(_tell, args, access)
+        asyncio.run(serve_page(server, args.listen, args.port, tls, tell, stop))
+    return 0
+
+
+def _tell(args: argparse.Namespace, access: "Access", port: int) -> None:
+    """Say where the page is; from other machines by links, and by new ones for each line on the terminal."""
+    if access.open_here:
+        print(f"web shows '{args.name}' at http://{args.listen}:{port}", flush=True)
+        return
+    print(f"web shows '{args.name}' on port {port}, by a link for one browser each; Enter makes new ones", flush=True)
+    _tell_links(access, port)
+    if sys.stdin is not None and sys.stdin.isatty():
+        threading.Thread(target=_offer_links, args=(access, port), name="links", daemon=True).start()
+
+
+def _offer_links(access: "Access", port: int) -> None:
+    for _ in sys.stdin:
+        _tell_links(access, port)
+
+
+def _tell_links(access: "Access", port: int) -> None:
+    import segno
+
+    for words, drives in (("to drive and teach", True), ("to look and stop", False)):
+        link = f"https://{access.best_host}:{port}/enter/{access.new_link(time.monotonic(), drives=drives)}"
+        print(f"\n{words}: {link}", flush=True)
+        if drives and sys.stdout.isatty():
+            segno.make(link, error="l").terminal(compact=True)
