@@ -17,16 +17,15 @@ from lira.fusion.learning.kernel_novice import KernelNovice
 from lira.fusion.log.recorder import Journal
 from lira.fusion.log.run_log import LapRecord, Pose, Record, ResultRecord, StepRecord
 from lira.fusion.methods.base import Method
-from lira.fusion.methods.doubt import Doubtful
 from lira.fusion.methods.shield import Shield, Shielded
+from lira.fusion.methods.stop_and_ask import Doubtful
 from lira.fusion.teaching.session import Session
 from lira.hal.messages import Phase
 from lira.hal.profile import Field, RobotProfile, load_profile
 from lira.sim_backend.foresight import with_small_camera
 from lira.sim_backend.world import World
 from lira.tools.experiments.shifts import shifted
-from lira.tools.runs.build import lap
-from lira.tools.runs.course import Course
+from lira.tools.runs.course import Course, lap
 from lira.tools.runs.simulated import SimulatedRobot, simulate
 
 Way = Literal["plain", "field", "shield", "ask"]
