@@ -17,6 +17,7 @@ from lira.fusion.log.label_salvage import lock, survey
 from lira.fusion.preprocess import Features
 from lira.hal.config import open_regular
 from lira.hal.errors import ConfigError, StorageError
+from lira.hal.messages import Driver
 
 PAUSE_S = 1.0  # two decisions of the slowest robot; a hand that was off for so long has come back
 
@@ -35,7 +36,7 @@ def last_intervention(labels: Sequence[Demonstration]) -> list[int]:
     interventions: list[list[int]] = [[]]
     last: Demonstration | None = None
     for number, label in enumerate(labels):
-        if label.source != "human":
+        if label.source != Driver.HUMAN:
             last = None if label.stored else last
             continue
         if last is None or (label.run, label.lap) != (last.run, last.lap) or label.stamp_s > last.stamp_s + PAUSE_S:
