@@ -115,7 +115,7 @@ class LiraPlus(LiraSpf):
 
     def policy(self, driver: str) -> Policy:
         """The policy behind a driver's name: a novice that practises drives as it does alone."""
-        return self.novice.alone if driver == "novice" and self._practises else super().policy(driver)
+        return self.novice.alone if driver == Driver.NOVICE and self._practises else super().policy(driver)
 
     @property
     def _practises(self) -> bool:
