@@ -6,7 +6,7 @@ SEEDS := 10
 WORKERS := 2
 TEST_WORKERS := 6
 EXPERTS := $(foreach task,line eight passage garden corridor,camera:--task:$(task)) \
-  $(foreach task,line passage garden,lidar:--task:$(task))
+  $(foreach task,line passage garden,lidar:--task:$(task)) depth:--task:table-top
 BENCHES := twin lockstep latency train preprocess step log drivers takeover
 
 .DEFAULT_GOAL := help

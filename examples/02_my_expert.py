@@ -22,7 +22,7 @@ def main() -> None:
     with TemporaryDirectory() as folder, lira.simulate("lane") as robot:
         taught = lira.teach(robot, "lira", more_experts=[mine], laps=1, unseen=0, folder=folder)
         steps = [each for each in lira.read_run(Path(folder) / "run.jsonl") if isinstance(each, lira.StepRecord)]
-    training = [step for step in steps if step.decision.phase == "train"]
+    training = [step for step in steps if step.decision.phase is lira.Phase.TRAIN]
     print("who drove:   ", dict(Counter(step.decision.driver for step in training)))
     print("who taught:  ", dict(Counter(step.label for step in training if step.label)))
     print("wall active: ", sum(step.decision.experts[2].active for step in training), "steps")

@@ -18,8 +18,8 @@ class FarFromAll(lira.Method):
         """Decide as if no human were there."""
         a_n = self.novice.act(features)
         away = min(abs(a_n[1] - expert.act(features)[1]) for expert in self.experts)
-        call = lira.Call.FEEDBACK if away > self.far else lira.Call.NONE
-        choice = lira.Choice("novice", a_n, call=call) if self.novice.trained else lira.Choice("human", (0.0, 0.0))
+        own = lira.Choice(lira.Driver.NOVICE, a_n, call=lira.Call.FEEDBACK if away > self.far else lira.Call.NONE)
+        choice = own if self.novice.trained else lira.Choice(lira.Driver.NOBODY, (0.0, 0.0))
         return lira.Proposal(features, choice, a_n, speed=0.3 if away > self.far else 1.0)
 
 

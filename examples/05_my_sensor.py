@@ -1,7 +1,7 @@
 """A sensor of your own: an infrared ranger on the robot, read at the other end of the bus.
 
 A range travels already: fill in `ranges`. A new kind of sensor is a message, a row in the table of topics and a driver;
-and learned from are the scan and the image only, so far: `Features` has no others.
+what a robot learns from is a row of another table, see docs/howto/sensor.md.
 """
 
 import math

@@ -27,7 +27,7 @@ for lap in (each for each in records if isinstance(each, lira.LapRecord)):
 # %%
 steps = [each for each in records if isinstance(each, lira.StepRecord)]
 print("drivers:", Counter(step.decision.driver for step in steps).most_common())
-called = [step.state.progress_m or 0.0 for step in steps if step.state and step.decision.call == "feedback"]
+called = [step.state.progress_m or 0.0 for step in steps if step.state and step.decision.call is lira.Call.FEEDBACK]
 print("called for feedback at", sorted({round(progress_m) for progress_m in called}), "m along the line")
 
 # %% [markdown]

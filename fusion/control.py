@@ -8,7 +8,7 @@ from lira.fusion.methods.base import STAND, Choice, Chooser, Lesson, Method, Pol
 from lira.fusion.preprocess import Features, Preprocessor
 from lira.hal.errors import PluginError, SensorError
 from lira.hal.messages import HELD as HELD
-from lira.hal.messages import STOP, Action, Applied, Command, CourseState, Observation, Reason, Source, Twist
+from lira.hal.messages import STOP, Action, Applied, Command, CourseState, Driver, Observation, Reason, Source, Twist
 from lira.hal.port import Restartable, Robot
 from lira.hal.profile import Base
 
@@ -138,7 +138,7 @@ class ControlLoop:
 
     def _driving_policy(self, method: Method, proposal: Proposal) -> Policy | None:
         driver = proposal.choice.driver
-        return None if driver == "human" else method.policy(driver)
+        return None if driver == Driver.NOBODY else method.policy(driver)
 
     def _teach(self, action: Action | None, answers: int) -> None:
         """Drive for the scripted teacher through the same input that a gamepad uses."""
@@ -159,7 +159,7 @@ class ControlLoop:
             return method.learn(proposal, to_action(applied.twist, self._base))
         if applied.source is Source.POLICY and applied.reason is Reason.OK:
             return method.learn(proposal, None)
-        return Lesson(Choice("none", STAND))
+        return Lesson(Choice(Driver.NOBODY, STAND))
 
     def _keep_time(self) -> None:
         """Wait for the next absolute deadline; after a stall, start afresh instead of catching up.

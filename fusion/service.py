@@ -11,7 +11,7 @@ from lira.fusion.control import ControlLoop
 from lira.fusion.log.recorder import Journal
 from lira.fusion.methods.base import Method
 from lira.fusion.operator_service import OperatorService
-from lira.hal.messages import STOP, Applied, Reason
+from lira.hal.messages import STOP, Applied, Phase, Reason
 
 
 def reason_alone(applied: Applied) -> str:
@@ -58,4 +58,4 @@ def serve(
             said = reason
         if step is not None:
             episode = 0 if operator_service is None else operator_service.episode
-            journal.note(step, phase="train", lap=episode, layout=layout, training_steps=training_steps())
+            journal.note(step, phase=Phase.TRAIN, lap=episode, layout=layout, training_steps=training_steps())

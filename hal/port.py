@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 from typing import Protocol, runtime_checkable
 
-from lira.hal.messages import Applied, Command, CourseState, Episode, Observation
+from lira.hal.messages import Applied, Command, CourseState, DiagnosticStatus, Episode, Observation
 from lira.hal.profile import RobotProfile
 
 
@@ -76,6 +76,14 @@ class DeviceMonitor(Protocol):
 
     def device_health(self) -> DeviceHealth:
         """How the devices are now. Returns at once; may be called from any thread."""
+
+
+@runtime_checkable
+class SelfDiagnosis(Protocol):
+    """What a robot may have beside the port: what its devices say of themselves, for whoever looks after it."""
+
+    def diagnostics(self) -> tuple[DiagnosticStatus, ...]:
+        """One status a device, named after it. Returns at once; may be called from any thread."""
 
 
 @runtime_checkable

@@ -25,12 +25,23 @@ if TYPE_CHECKING:
     from lira.fusion.learning.learned_policy import LearnedPolicy
     from lira.fusion.log.label_log import read_demonstrations
     from lira.fusion.log.run_log import LapRecord, StepRecord, read_run
-    from lira.fusion.methods.base import Call, Choice, Expert, Method, Proposal
+    from lira.fusion.methods.base import Choice, Expert, Method, Proposal
     from lira.fusion.methods.context import Context, MethodSettings
     from lira.fusion.preprocess import Features
     from lira.hal.client.remote import connect
     from lira.hal.errors import LiraError
-    from lira.hal.messages import Applied, Command, Observation, Odometry, Range, Reason, Twist
+    from lira.hal.messages import (
+        Applied,
+        Call,
+        Command,
+        Driver,
+        Observation,
+        Odometry,
+        Phase,
+        Range,
+        Reason,
+        Twist,
+    )
     from lira.hal.port import Robot
     from lira.hal.profile import RobotProfile, load_profile
     from lira.hal.safety.governed import govern
@@ -45,12 +56,23 @@ _WHERE = {
     "lira.fusion.learning.learned_policy": ("LearnedPolicy",),
     "lira.fusion.log.label_log": ("read_demonstrations",),
     "lira.fusion.log.run_log": ("LapRecord", "StepRecord", "read_run"),
-    "lira.fusion.methods.base": ("Call", "Choice", "Expert", "Method", "Proposal"),
+    "lira.fusion.methods.base": ("Choice", "Expert", "Method", "Proposal"),
     "lira.fusion.methods.context": ("Context", "MethodSettings"),
     "lira.fusion.preprocess": ("Features",),
     "lira.hal.client.remote": ("connect",),
     "lira.hal.errors": ("LiraError",),
-    "lira.hal.messages": ("Applied", "Command", "Observation", "Odometry", "Range", "Reason", "Twist"),
+    "lira.hal.messages": (
+        "Applied",
+        "Call",
+        "Command",
+        "Driver",
+        "Observation",
+        "Odometry",
+        "Phase",
+        "Range",
+        "Reason",
+        "Twist",
+    ),
     "lira.hal.port": ("Robot",),
     "lira.hal.profile": ("RobotProfile", "load_profile"),
     "lira.hal.safety.governed": ("govern",),
@@ -67,6 +89,7 @@ __all__ = [
     "Choice",
     "Command",
     "Context",
+    "Driver",
     "Expert",
     "Features",
     "LapRecord",
@@ -76,6 +99,7 @@ __all__ = [
     "MethodSettings",
     "Observation",
     "Odometry",
+    "Phase",
     "Proposal",
     "Range",
     "Reason",

@@ -2,13 +2,23 @@
 
 import threading
 import time
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from lira.hal.bus.sensors import observation_of, same_readings
 from lira.hal.clock import is_fresh
 from lira.hal.errors import ConfigError, DeviceError
-from lira.hal.messages import STOP, Applied, Command, DepthImage, LaserScan, Observation, Reason, Source
+from lira.hal.messages import (
+    STOP,
+    Applied,
+    Command,
+    DepthImage,
+    DiagnosticStatus,
+    LaserScan,
+    Observation,
+    Reason,
+    Source,
+)
 from lira.hal.port import DeviceHealth
 from lira.hal.profile import RobotProfile
 from lira.robot.camera.device import CameraDevice
@@ -20,6 +30,7 @@ from lira.robot.supervisor import Supervisor
 
 OPEN_S = 20.0  # a CORE2 boots for 2 s and may speak at three speeds
 BLIND_S = 0.5  # driven on no older scan than this
+ERROR = 2  # level of a status
 
 
 @dataclass(frozen=True, slots=True)
@@ -34,8 +45,9 @@ class Devices:
 
 
 class Rosbot:
-    """Implements `hal.port.Robot`, `MotorSwitch`, `SensorEvents` and `DeviceMonitor`. Its clock is the monotonic clock.
+    """Implements `hal.port.Robot`, `MotorSwitch`, `SensorEvents`, `DeviceMonitor` and `SelfDiagnosis`.
 
+    Its clock is the monotonic clock.
     A device that is lost ("lidar", "camera", "base") is opened again by itself; to stand meanwhile is the governor's.
     """
 
@@ -53,7 +65,7 @@ class Rosbot:
         self._supervisors = {"base": Supervisor("base", self.base.session)}
         if devices.lidar is not None:
             self.lidar = RPLidar(devices.lidar, profile.lidar, devices.settings.lidar, self._see_scan)
-            self._supervisors["lidar"] = Supervisor("lidar", self.lidar.session)
+            self._supervisors["lidar"] = Supervisor("lidar", self.lidar.session, self.lidar.rest)
         if devices.camera is not None:
             depth = devices.settings.camera.depth or profile.depth is not None
             camera = CameraDevice(devices.camera, profile.camera, self._see_picture, devices.openni_folder, depth=depth)
@@ -129,6 +141,15 @@ class Rosbot:
     def cut_motors(self, off: bool) -> None:
         """Take the motors' power away in the firmware, or give it back: a second emergency stop, below ours."""
         self.base.cut_motors(off)
+
+    def diagnostics(self) -> tuple[DiagnosticStatus, ...]:
+        """How the base and the lidar are, and why one of them is lost."""
+        told = [self.base.diagnostics()] + ([] if self.lidar is None else [self.lidar.diagnostics()])
+        troubles = self.troubles()
+        return tuple(
+            replace(status, level=ERROR, message=troubles[status.name]) if status.name in troubles else status
+            for status in told
+        )
 
     def troubles(self) -> dict[str, str]:
         """What is wrong with which device, each with its remedy; empty while all work."""

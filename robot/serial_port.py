@@ -9,9 +9,11 @@ from pathlib import Path
 import serial
 
 from lira.hal.errors import DeviceError
+from lira.robot.port_users import other_users
 
 READ_SIZE = 4096
 FLUSHES = 64
+BITS = 10  # of a byte on the line
 WRITE_TIMEOUT_S = 0.2
 # What pyserial lets through, besides its own, from the system and its own arithmetic.
 FAULTS = (serial.SerialException, OSError, ValueError, TypeError, OverflowError, termios.error)
@@ -36,6 +38,11 @@ class Line:
         except FAULTS as error:
             raise _why_not(url, error) from error
         self.has_baud = "://" not in url
+        self.baud = baud
+        users = other_users(url) if self.has_baud else []
+        if users:
+            self.close()
+            raise DeviceError(f"{url} is in use by {', '.join(users)}", "Stop that program first.")
 
     def fileno(self) -> int:
         """Its descriptor, for another process to share. Raises `DeviceError` for a line that has none."""
@@ -47,9 +54,14 @@ class Line:
     def set_baud(self, baud: int) -> None:
         """Change the speed. Raises `DeviceError` if the port cannot."""
         try:
-            self._port.baudrate = baud
+            self._port.baudrate = self.baud = baud
         except FAULTS as error:
             raise DeviceError(f"{self.url} cannot do {baud} baud: {error}", "Use another serial adapter.") from error
+
+    @property
+    def byte_s(self) -> float:
+        """How long a byte takes; 0 where that is not known."""
+        return BITS / self.baud if self.has_baud else 0.0
 
     def read(self, timeout_s: float) -> bytes:
         """Return what has come, at once if there is any; nothing after `timeout_s`."""

@@ -14,12 +14,17 @@ Seconds = Annotated[float, Meta(ge=0.0, le=10.0)]
 
 
 class LidarSettings(Table, frozen=True):
-    """The RPLIDAR. `yaw_offset_deg`: the robot's bearing of the unit's angle 0; `mirror`: it hangs upside down."""
+    """The RPLIDAR. `yaw_offset_deg`: the robot's bearing of the unit's angle 0; `mirror`: it hangs upside down.
+
+    `motor_pwm`: duty to begin with, of 1023; from then on the profile's rate is held. `ascending_time`: scans in the
+    order of time, clockwise, for consumers that need it.
+    """
 
     yaw_offset_deg: float = 0.0
     mirror: bool = False
     motor_pwm: Annotated[int, Meta(ge=1, le=1023)] = 660
     spin_up_s: Seconds = 1.5
+    ascending_time: bool = False
 
     @property
     def yaw_offset_rad(self) -> float:
@@ -32,7 +37,7 @@ class BaseSettings(Table, frozen=True):
 
     distance_scale: Scale = 1.0
     turn_scale: Scale = 1.0
-    spin_slip_m_rad: float = 0.0
+    spin_slip_m_rad: float = -0.0114  # by the firmware's own arithmetic
     boot_s: Seconds = 2.0  # after the line is opened
 
 

@@ -22,11 +22,15 @@ Raises `DeviceError` when it is missing, wrong or lost.
 
 
 class Supervisor:
-    """Runs sessions of one device, one after the other, until closed. Whatever ends a session, there is a next one."""
+    """Runs sessions of one device, one after the other, until closed. Whatever ends a session, there is a next one.
 
-    def __init__(self, name: str, session: Session) -> None:
+    `rest` is called at the end, when the device may have been left as a lost session had it.
+    """
+
+    def __init__(self, name: str, session: Session, rest: Callable[[], None] = lambda: None) -> None:
         self.name = name
         self._session = session
+        self._rest = rest
         self._stop = threading.Event()
         self._alive = threading.Event()
         self._began_s = 0.0
@@ -91,6 +95,7 @@ class Supervisor:
                     wait_s = RETRY_S
             self._stop.wait(wait_s)
             wait_s = max(RETRY_S, min(2.0 * wait_s, SLOWEST_S))
+        self._rest()
 
     def _begin(self) -> None:
         self.sessions += 1

@@ -1,1 +1,1 @@
-"""The digital twin of the ROSbot in pybullet: worlds, sensors, drive."""
+"""The digital twin of the ROSbot: worlds, sensors, drive."""

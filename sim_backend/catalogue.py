@@ -20,8 +20,8 @@ def known_worlds() -> list[str]:
 def load_world(name_or_path: str) -> World:
     """Load a world by name, or a user's own by the path of its TOML file.
 
-    Raises `ConfigError` for an unknown name, an unknown key, a value out of range, a line that does not close
-    or a box on the start.
+    Raises `ConfigError` for an unknown name, an unknown key, a value out of range, a line that does not close,
+    a box on the start or a mesh that is not there.
     """
     if name_or_path.endswith(".toml"):
         path = Path(name_or_path)
@@ -32,9 +32,14 @@ def load_world(name_or_path: str) -> World:
             f"unknown world '{name_or_path}'",
             f"Known worlds: {', '.join(known_worlds())}; or give the path of a .toml file.",
         )
-    world = msgspec.structs.replace(load_toml(path, World), name=path.stem)
+    world = load_toml(path, World)
+    meshes = tuple(msgspec.structs.replace(mesh, path=str((path.parent / mesh.path).resolve())) for mesh in world.mesh)
+    world = msgspec.structs.replace(world, name=path.stem, mesh=meshes)
     try:
         check(world)
     except ValueError as error:
         raise ConfigError(f"{path}: {error}", "Mend the world file.") from error
+    for mesh in meshes:
+        if not Path(mesh.path).is_file():
+            raise ConfigError(f"{path}: there is no mesh {mesh.path}", "A mesh's path is from the world's file.")
     return world

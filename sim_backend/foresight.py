@@ -14,7 +14,7 @@ from lira.sim_backend.course import Course, Place, footprint_radius_m
 from lira.sim_backend.drive import Motion
 from lira.sim_backend.layout import build
 from lira.sim_backend.polyline import Floats
-from lira.sim_backend.scenes.opening import Renderer
+from lira.sim_backend.scenes.opening import Renderer, quickest
 from lira.sim_backend.twin import Twin
 from lira.sim_backend.world import World
 
@@ -48,11 +48,12 @@ class Foresight:
     """
 
     def __init__(
-        self, profile: RobotProfile, world: str | World, layout: int = 0, *, renderer: Renderer = "sketch"
+        self, profile: RobotProfile, world: str | World, layout: int = 0, *, renderer: Renderer | None = None
     ) -> None:
         self._profile = profile
         self._world = load_world(world) if isinstance(world, str) else world
-        self._twin = Twin(with_small_camera(profile), self._world, layout=layout, renderer=renderer)
+        body = with_small_camera(profile)
+        self._twin = Twin(body, self._world, layout=layout, renderer=renderer or quickest(self._world))
         self.set_layout(layout)
 
     def set_layout(self, layout: int) -> None:
@@ -60,9 +61,17 @@ class Foresight:
         self.course = Course(build(self._world, layout), footprint_radius_m(self._profile.base))
 
     def rollout(
-        self, state: CourseState, policy: Callable[[Observation], Action], steps: int, period_s: float
+        self,
+        state: CourseState,
+        policy: Callable[[Observation], Action],
+        steps: int,
+        period_s: float,
+        ends: Callable[[CourseState], bool] = lambda _: False,
     ) -> list[CourseState]:
-        """Let `policy` drive from `state`: the state after each of `steps`, the last being a collision or a loss."""
+        """Let `policy` drive from `state`: the state after each of `steps`.
+
+        The last is a collision, a loss, or the first that `ends` it: what comes after is not looked at.
+        """
         twin, base = self._twin, self._profile.base
         twin.open()
         twin.place(self.course.layout.seed, state)
@@ -73,7 +82,7 @@ class Foresight:
             twin.drive(Command(twist, twin.now()))
             twin.wait(twin.now() + period_s)
             states.append(twin.state())
-            if states[-1].collided or states[-1].lost:
+            if states[-1].collided or states[-1].lost or ends(states[-1]):
                 break
         return states
 

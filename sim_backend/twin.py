@@ -47,7 +47,7 @@ class Twin:
             raise ConfigError(f"real-time factor {realtime_factor} is not positive", "Use 1 for real time.")
         self._profile = profile
         self.world = load_world(world) if isinstance(world, str) else world
-        self._renderer = settle(renderer)
+        self._renderer = settle(renderer, self.world)
         self._seed = seed
         self._factor = realtime_factor
         self._began_s = time.monotonic()

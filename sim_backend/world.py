@@ -132,6 +132,21 @@ class Box(Table, frozen=True):
     gray: Gray = 0
 
 
+class Mesh(Table, frozen=True):
+    """A thing with a shape of its own, from a file: only pybullet draws and scans it, in one gray.
+
+    The referee knows boxes alone: put one where it must not be touched. `path` is from the world's file.
+    """
+
+    path: Annotated[str, Meta(pattern=r"\.(obj|stl|urdf)$")]
+    x_m: Metres
+    y_m: Metres
+    z_m: Metres = 0.0
+    yaw_deg: Degrees = 0.0
+    scale: Annotated[float, Meta(gt=0.0, le=1000.0)] = 1.0
+    gray: Gray = 0
+
+
 class Along(Table, frozen=True):
     """Boxes scattered along the line, at least `spacing_m` from centre to centre along it.
 
@@ -216,6 +231,7 @@ class World(Table, frozen=True):
     patch: Annotated[tuple[Patch, ...], Meta(max_length=MAX_BOXES)] = ()
     tiles: Annotated[tuple[Tiles, ...], Meta(max_length=MAX_SCATTERS)] = ()
     box: Annotated[tuple[Box, ...], Meta(max_length=MAX_BOXES)] = ()
+    mesh: Annotated[tuple[Mesh, ...], Meta(max_length=MAX_SCATTERS)] = ()
     along: Annotated[tuple[Along, ...], Meta(max_length=MAX_SCATTERS)] = ()
     area: Annotated[tuple[Area, ...], Meta(max_length=MAX_SCATTERS)] = ()
 

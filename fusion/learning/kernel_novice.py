@@ -1,4 +1,4 @@
-"""The novice of `fusion/kernel.py`: it learns from each label at once, and says how sure it is."""
+"""The novice of `policies/kernel.py`: it learns from each label at once, and says how sure it is."""
 
 import math
 from dataclasses import replace
@@ -12,7 +12,7 @@ from lira.fusion.learning.learned_policy import Contradiction, Part
 from lira.fusion.learning.novice import LearningSettings, Novice
 from lira.fusion.policies.kernel import ANGULAR, KernelRidge, KernelSettings
 from lira.fusion.preprocess import Features
-from lira.hal.messages import Action
+from lira.hal.messages import Action, Driver
 
 
 class KernelNovice(Novice):
@@ -62,7 +62,7 @@ class KernelNovice(Novice):
         """Learn a label. What one source shows in a row is a group: its labels say little about each other's worth."""
         if not self._given or self._given[-1][0] != label.source:
             self._group += 1
-        human = label.source == "human"
+        human = label.source == Driver.HUMAN
         for each in (label, mirror(label)) if self._mirrored else (label,):
             x = self._x(each.features)
             self.ridge.add(x, each.action, each.weight, human=human, group=self._group, label=self.stored)

@@ -10,7 +10,7 @@ REST = 1e-6  # an action within this of zero is none
 
 @dataclass(frozen=True, slots=True)
 class Label:
-    """What to do on what was seen. `source` is "human" or an expert's name, `weight` scales its squared error."""
+    """What to do on what was seen. `source` is the driver who gave it, `weight` scales its squared error."""
 
     features: Features
     action: Action

@@ -15,7 +15,7 @@ from lira.fusion.learning.labels import Label, is_rest
 from lira.fusion.learning.learned_policy import LearnedPolicy
 from lira.fusion.preprocess import Features
 from lira.hal.config import Table
-from lira.hal.messages import Action
+from lira.hal.messages import Action, Driver
 
 CATCH_UP_POLL_S = 0.005
 
@@ -93,7 +93,7 @@ class Novice(LearnedPolicy, ABC):
     def learn(self, features: Features, action: Action, source: str, a_n: Action) -> bool:
         """Store a label unless it is redundant; `a_n` is the novice's own action there. Returns whether it was kept."""
         threshold = self.settings.redundancy * self.settings.action_range
-        keep_always = source == "human" and not self.settings.filter_human
+        keep_always = source == Driver.HUMAN and not self.settings.filter_human
         if not keep_always and is_redundant(action, a_n, threshold):
             return False
         self.remember(Label(features, action, source, self.weight(source)))
@@ -105,7 +105,7 @@ class Novice(LearnedPolicy, ABC):
 
     def weight(self, source: str) -> float:
         """How much a label of this source counts."""
-        return self.settings.human_weight if source == "human" else 1.0
+        return self.settings.human_weight if source == Driver.HUMAN else 1.0
 
     def catch_up(self) -> None:
         """Wait until everything that is due is learned."""

@@ -4,8 +4,8 @@ from collections import Counter
 
 import msgspec
 
-from lira.fusion.methods.base import Call, Choice, Lesson
-from lira.hal.messages import LabelCounts
+from lira.fusion.methods.base import Choice, Lesson
+from lira.hal.messages import Call, Driver, LabelCounts
 
 ANSWER_S = 2.0 + 1e-6  # an intervention so soon after a call belongs to it; steps fall on the very limit
 DEMONSTRATION = "demonstration"
@@ -18,7 +18,7 @@ class Account(msgspec.Struct, frozen=True):
     or no later than 2 s after its end: the teacher, who looks ahead with what is driving, saw it go wrong. An
     intervention is *called for* by the same rule. So precision is `answered / call_episodes` and recall
     `called_for / interventions`. A *switch* is a change of the driver. `given` and `stored` count labels by source:
-    "human", "demonstration" (the human before the first training step), "mean", or an expert's name.
+    the driver who gave them, or "demonstration" (the human before the first training step).
     """
 
     steps: int = 0
@@ -60,7 +60,7 @@ class Ledger:
         """Count one step; `demonstrating` says whether the method had nobody to drive but the human."""
         choice = lesson.choice
         if choice.label is not None:
-            source = DEMONSTRATION if demonstrating and choice.driver == "human" else choice.driver
+            source = DEMONSTRATION if demonstrating and choice.driver == Driver.HUMAN else choice.driver
             self._given[source] += 1
             self._stored[source] += lesson.stored
         for settled in lesson.settled:
@@ -71,13 +71,13 @@ class Ledger:
         self._last = choice
 
     def _note_driver(self, choice: Choice, now_s: float) -> None:
-        human, last = choice.driver == "human", self._last
+        human, last = choice.driver == Driver.HUMAN, self._last
         chosen = choice.given > (last.given if last is not None else 0)
         self._choices += chosen
         self._count["steps"] += 1
         self._count["human_steps"] += human
         self._count["switches"] += last is not None and last.driver != choice.driver
-        if chosen or (human and (last is None or last.driver != "human")):
+        if chosen or (human and (last is None or last.driver != Driver.HUMAN)):
             self.interventions += 1
             recent = sum(end_s >= now_s - ANSWER_S for end_s in self._unanswered)
             self._count["answered"] += recent
@@ -90,7 +90,8 @@ class Ledger:
         before = Call.NONE if self._last is None else self._last.call
         self.calls += before is not choice.call
         self._count["call_steps"] += 1
-        self._count["slowed_steps"] += choice.call is Call.FEEDBACK and choice.driver != "human"
+        moves = choice.driver not in (Driver.HUMAN, Driver.NOBODY)
+        self._count["slowed_steps"] += choice.call is Call.FEEDBACK and moves
         if before is Call.NONE or not self._unanswered:
             self._count["call_episodes"] += 1
             self._unanswered = [end_s for end_s in self._unanswered if end_s >= now_s - ANSWER_S] + [now_s]
@@ -100,9 +101,9 @@ class Ledger:
     def labels(self) -> LabelCounts:
         """Labels so far."""
         return LabelCounts(
-            given_human=self._given["human"] + self._choices,
+            given_human=self._given[Driver.HUMAN] + self._choices,
             given_expert=_experts(self._given),
-            stored_human=self._stored["human"] + self._choices,
+            stored_human=self._stored[Driver.HUMAN] + self._choices,
             stored_expert=_experts(self._stored),
             demonstration=self._stored[DEMONSTRATION],
         )
@@ -119,4 +120,4 @@ class Ledger:
 
 
 def _experts(counts: Counter[str]) -> int:
-    return counts.total() - counts["human"] - counts[DEMONSTRATION]
+    return counts.total() - counts[Driver.HUMAN] - counts[DEMONSTRATION]

@@ -14,9 +14,17 @@ from pathlib import Path
 from lira.fusion.log.label_file import Demonstration, Format, read_format
 from lira.fusion.log.label_log import read_demonstrations, read_records
 from lira.fusion.log.label_salvage import lock, survey
+from lira.fusion.preprocess import Features
+from lira.hal.config import open_regular
 from lira.hal.errors import ConfigError, StorageError
+from lira.hal.messages import Driver
 
 PAUSE_S = 1.0  # two decisions of the slowest robot; a hand that was off for so long has come back
+
+
+def read_heads(path: Path) -> list[Demonstration]:
+    """All labels of a log without what was seen: a million of them fit into memory. Raises as `read_demonstrations`."""
+    return [replace(label, features=Features()) for label in read_demonstrations(path)]
 
 
 def last_intervention(labels: Sequence[Demonstration]) -> list[int]:
@@ -28,7 +36,7 @@ def last_intervention(labels: Sequence[Demonstration]) -> list[int]:
     interventions: list[list[int]] = [[]]
     last: Demonstration | None = None
     for number, label in enumerate(labels):
-        if label.source != "human":
+        if label.source != Driver.HUMAN:
             last = None if label.stored else last
             continue
         if last is None or (label.run, label.lap) != (last.run, last.lap) or label.stamp_s > last.stamp_s + PAUSE_S:
@@ -44,11 +52,14 @@ def correct(path: Path, numbers: Sequence[int], *, stored: bool) -> list[Demonst
     Raises `ConfigError` for a number that no label has, `StorageError` for a log that is damaged, in use or full.
     """
     with _appending(path) as (file, form):
-        labels = list(read_demonstrations(path))
-        for number in numbers:
-            if not 0 <= number < len(labels):
-                raise ConfigError(f"{path} has no label {number}", f"They go from 0 to {len(labels) - 1}.")
-        chosen = [labels[number] for number in sorted(set(numbers))]
+        wanted, count, chosen = set(numbers), 0, []
+        for number, label in enumerate(read_demonstrations(path)):
+            count += 1
+            if number in wanted:
+                chosen.append(label)
+        if len(chosen) < len(wanted):
+            wrong = next(number for number in sorted(wanted) if not 0 <= number < count)
+            raise ConfigError(f"{path} has no label {wrong}", f"They go from 0 to {count - 1}.")
         changed = [label for label in chosen if (label.undone if stored else label.stored)]
         _append(file, path, b"".join(form.encode(_correction(label, stored)) for label in changed))
     return changed
@@ -117,7 +128,7 @@ def _appending(path: Path) -> Iterator[tuple[int, Format]]:
 def _whole(path: Path) -> Format:
     """Return the format of a log in which nothing is damaged. Raises `StorageError`."""
     try:
-        with path.open("rb") as file:
+        with open_regular(path) as file:
             form = read_format(file, path)
             found = survey(file, form, file.tell())
     except OSError as error:

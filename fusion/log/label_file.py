@@ -25,7 +25,7 @@ from lira.fusion.learning.labels import is_rest
 from lira.fusion.preprocess import MODALITIES, Features, Shape, shapes_of
 from lira.hal.config import MALFORMED
 from lira.hal.errors import StorageError
-from lira.hal.messages import Action
+from lira.hal.messages import Action, Driver
 from lira.hal.profile import RobotProfile
 
 MAGIC = b"LIRADEMO"
@@ -49,7 +49,7 @@ _CRC = struct.Struct("<I")
 class Demonstration:
     """One label that was given, and whether the redundancy filter stored it.
 
-    `source` is "human", an expert's name or "mean"; `novice` is a^N at that time; `features` what was seen.
+    `source` is the driver who gave it; `novice` is a^N at that time; `features` what was seen.
     `mirrored`: it was learned with left and right exchanged, too. `run` is which opening of the log it was given in,
     from 0; the log sets both.
 
@@ -79,7 +79,7 @@ class Demonstration:
     @property
     def idle(self) -> bool:
         """Whether the human had control and did nothing."""
-        return self.source == "human" and is_rest(self.action)
+        return self.source == Driver.HUMAN and is_rest(self.action)
 
 
 @dataclass(frozen=True, slots=True)

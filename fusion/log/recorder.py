@@ -9,9 +9,9 @@ from lira.fusion.learning.learned_policy import LearnedPolicy
 from lira.fusion.log.counts import Ledger
 from lira.fusion.log.label_log import Demonstration
 from lira.fusion.log.run_log import ContradictionRecord, Pose, Record, StepRecord
-from lira.fusion.methods.base import Call, Proposal
+from lira.fusion.methods.base import Proposal
 from lira.fusion.preprocess import MODALITIES
-from lira.hal.messages import Decision
+from lira.hal.messages import Call, Decision, Driver, Phase
 
 
 def _nowhere(_: object) -> None:
@@ -58,12 +58,12 @@ class Journal:
             for (number, lap, stamp_s), each in places
         )
 
-    def note(self, step: Step, *, phase: str, lap: int, layout: int, training_steps: int) -> None:
+    def note(self, step: Step, *, phase: Phase, lap: int, layout: int, training_steps: int) -> None:
         """Record one step."""
         choice, features = step.lesson.choice, step.proposal.features
         self._keep_labels(step, lap)
-        if phase == "train":
-            demonstrating = step.proposal.choice.driver == "human"
+        if phase == Phase.TRAIN:
+            demonstrating = step.proposal.choice.driver == Driver.NOBODY
             self.ledger.note(step.lesson, now_s=step.observation.stamp_s, demonstrating=demonstrating)
         decision = self._decision(step, phase, lap, training_steps)
         self._publish(decision)
@@ -108,16 +108,16 @@ class Journal:
             self._learned.append((self._given, label.lap, label.stamp_s))
         self._given += 1
 
-    def _decision(self, step: Step, phase: str, lap: int, training_steps: int) -> Decision:
+    def _decision(self, step: Step, phase: Phase, lap: int, training_steps: int) -> Decision:
         choice, proposal = step.lesson.choice, step.proposal
         return Decision(
             stamp_s=step.observation.stamp_s,
             observation=step.observation.seq,
             driver=choice.driver,
-            call=str(choice.call),
+            call=choice.call,
             executed=choice.action,
             novice=proposal.novice,
-            human=choice.action if choice.driver == "human" else None,
+            human=choice.action if choice.driver == Driver.HUMAN else None,
             experts=proposal.experts,
             threshold=proposal.threshold,
             labels=self.ledger.labels,

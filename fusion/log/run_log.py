@@ -15,7 +15,7 @@ import msgspec
 from lira.fusion.log.counts import Account
 from lira.hal.config import MALFORMED, open_regular
 from lira.hal.errors import StorageError
-from lira.hal.messages import Action, CourseState, Decision
+from lira.hal.messages import Action, CourseState, Decision, Phase
 
 LINE_BYTES = 2**20  # ten times what a step with the largest picture takes
 
@@ -58,7 +58,7 @@ class Pose(msgspec.Struct, frozen=True):
 class StepRecord(msgspec.Struct, frozen=True, tag="step"):
     """One decision, where the robot really was, and what was learned from it.
 
-    `label` names the source of a label stored at this step ("human", "mean" or an expert's name), else None.
+    `label` names who gave a label that was stored at this step, else None.
     `image` is what the camera showed when a call rose: uint8 [px, px] row by row, else None.
     """
 
@@ -71,14 +71,14 @@ class StepRecord(msgspec.Struct, frozen=True, tag="step"):
 
 
 class LapRecord(msgspec.Struct, frozen=True, tag="lap"):
-    """The end of one lap. `phase` is "train", "prove" (the novice alone) or "unseen" (alone on a new layout).
+    """The end of one lap.
 
     `human_labels` (stored), `interventions`, `calls` and `buffer` are totals of the session so far; `passed` means: to
     the end, no collision, line never lost. `unassisted` means that no human action was needed. `stops` counts how often
     a novice that drove alone stood and asked, being in doubt; `shielded` in how many steps a shield changed its turn.
     """
 
-    phase: str
+    phase: Phase
     lap: int
     layout: int
     passed: bool

@@ -3,25 +3,16 @@
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from enum import StrEnum
 from typing import Protocol, runtime_checkable
 
 from lira.fusion.learning.learned_policy import UNTAUGHT, LearnedPolicy
 from lira.fusion.preprocess import Features
-from lira.hal.messages import Action, ExpertView
+from lira.hal.messages import Action, Call, Driver, ExpertView, Phase
 
 Policy = Callable[[Features], Action]
 """A black box: anything that turns what the robot senses into an action."""
 
 STAND: Action = (0.0, 0.0)
-
-
-class Call(StrEnum):
-    """How the human is called: to look, or to answer."""
-
-    NONE = "none"
-    ATTENTION = "attention"
-    FEEDBACK = "feedback"
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,6 +28,7 @@ class Expert:
 class Choice:
     """One row of the table of Algorithm 1: who drives, with which action, what is learned, how the human is called.
 
+    `driver` is a `Driver`, or the name of an expert or of whatever else a method lets drive.
     `given` counts the times the human gave an expert control; 0 where the driver has it by the method's own rules.
     """
 
@@ -120,19 +112,19 @@ class Method(ABC):
         if human is None:
             return Lesson(proposal.choice)
         if not self.learns or self.novice.leaves_out(human):
-            return Lesson(Choice("human", human))
-        stored = self.novice.learn(proposal.features, human, "human", proposal.novice)
-        return Lesson(Choice("human", human, label=human), stored)
+            return Lesson(Choice(Driver.HUMAN, human))
+        stored = self.novice.learn(proposal.features, human, Driver.HUMAN, proposal.novice)
+        return Lesson(Choice(Driver.HUMAN, human, label=human), stored)
 
     def policy(self, driver: str) -> Policy:
-        """Return the policy behind a driver's name, to look ahead with. Raises `KeyError` for "human"."""
-        return {**{expert.name: expert.act for expert in self.experts}, "novice": self.novice.act}[driver]
+        """Return the policy behind a driver's name, to look ahead with. Raises `KeyError` for the human."""
+        return {**{expert.name: expert.act for expert in self.experts}, Driver.NOVICE: self.novice.act}[driver]
 
-    def alone(self, phase: str) -> "Method":
-        """Return what drives without a teacher, in phase "prove" or "unseen": the novice, if anybody learns."""
+    def alone(self, phase: Phase) -> "Method":
+        """Return what drives without a teacher, to be proven or on unseen layouts: the novice, if anybody learns."""
         if not self.learns:
             return self
-        return Alone("novice", self.novice.proving if phase == "prove" else self.novice.alone)
+        return Alone(Driver.NOVICE, self.novice.proving if phase == Phase.PROVE else self.novice.alone)
 
     @property
     def calls_alone(self) -> bool:

@@ -16,10 +16,10 @@ import msgspec
 import numpy as np
 
 from lira.fusion.learning.novice import Novice
-from lira.fusion.methods.base import STAND, Call, Choice, Expert, Lesson, Method, Policy, Proposal
+from lira.fusion.methods.base import STAND, Choice, Expert, Lesson, Method, Policy, Proposal
 from lira.fusion.methods.context import Context, MethodSettings
 from lira.fusion.preprocess import Features
-from lira.hal.messages import Action, ExpertView
+from lira.hal.messages import Action, Call, Driver, ExpertView
 
 
 class LiraSettings(MethodSettings, frozen=True, tag="lira"):
@@ -69,15 +69,15 @@ def choose(human: Action | None, experts: Sequence[ExpertView], a_n: Action, thr
     """Lines 7 to 23: who drives, what is learned, and who is called."""
     active = [expert for expert in experts if expert.active]
     if human is not None:  # lines 7 to 9
-        return Choice("human", human, label=human)
+        return Choice(Driver.HUMAN, human, label=human)
     if not active:  # lines 22, 23
-        return Choice("novice", a_n)
+        return Choice(Driver.NOVICE, a_n)
     if len(active) == 1:  # lines 10 to 13
         return Choice(active[0].name, active[0].action, label=active[0].action, call=Call.ATTENTION)
     actions = [expert.action for expert in active]
     if in_consensus(actions, threshold):  # lines 14 to 18
-        return Choice("mean", mean(actions), label=mean(actions))
-    return Choice("novice", a_n, call=Call.FEEDBACK)  # lines 19 to 21; slowed down
+        return Choice(Driver.MEAN, mean(actions), label=mean(actions))
+    return Choice(Driver.NOVICE, a_n, call=Call.FEEDBACK)  # lines 19 to 21; slowed down
 
 
 class LiraSpf(Method):
@@ -126,7 +126,7 @@ class LiraSpf(Method):
 
     def policy(self, driver: str) -> Policy:
         """The policy behind a driver's name."""
-        if driver == "mean":
+        if driver == Driver.MEAN:
             return lambda features: mean([expert.act(features) for expert in self.experts])
         return super().policy(driver)
 
@@ -149,5 +149,5 @@ class LiraSpf(Method):
     def _beginning(self, a: Sequence[Action]) -> Choice:
         """Before the first training step the novice knows nothing: the human is asked to drive."""
         if self.settings.start == "experts":
-            return Choice("mean", mean(a), label=mean(a))
-        return Choice("human", STAND, call=Call.FEEDBACK)
+            return Choice(Driver.MEAN, mean(a), label=mean(a))
+        return Choice(Driver.NOBODY, STAND, call=Call.FEEDBACK)

@@ -15,12 +15,12 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 from lira.fusion.learning.novice import Novice
-from lira.fusion.methods.base import Call, Choice, Expert, Lesson, Method, Policy, Proposal, Settled
+from lira.fusion.methods.base import Choice, Expert, Lesson, Method, Policy, Proposal, Settled
 from lira.fusion.methods.context import Context, MethodSettings
 from lira.fusion.methods.lira import LiraSettings, LiraSpf, choose
 from lira.fusion.methods.stop_and_ask import Doubtful
 from lira.fusion.preprocess import Features
-from lira.hal.messages import Action
+from lira.hal.messages import Action, Call, Driver, Phase
 
 
 class PlusSettings(MethodSettings, frozen=True, tag="plus"):
@@ -79,9 +79,9 @@ class LiraPlus(LiraSpf):
             return self._prefill(proposal)
         if self._practises:
             a_n = self.novice.alone(features)
-            return replace(proposal, choice=Choice("novice", a_n), novice=a_n, speed=1.0)
+            return replace(proposal, choice=Choice(Driver.NOVICE, a_n), novice=a_n, speed=1.0)
         if proposal.choice.call is not Call.NONE and self.novice.trained and self._sure(features):
-            return replace(proposal, choice=Choice("novice", proposal.novice), speed=1.0)
+            return replace(proposal, choice=Choice(Driver.NOVICE, proposal.novice), speed=1.0)
         return proposal
 
     def learn(self, proposal: Proposal, human: Action | None) -> Lesson:
@@ -101,10 +101,10 @@ class LiraPlus(LiraSpf):
             settled = (*settled, Settled(past, super().learn(past, None).stored))
         return Lesson(proposal.choice, reserved=True, settled=settled)
 
-    def alone(self, phase: str) -> Method:
+    def alone(self, phase: Phase) -> Method:
         """The novice, which on unseen layouts may stop and ask. Who drives a proving run is examined."""
         self._examined = True
-        if phase == "unseen" and self.calls_alone:
+        if phase == Phase.UNSEEN and self.calls_alone:
             return Doubtful(self.novice.alone, self.novice.doubts)
         return super().alone(phase)
 
@@ -115,7 +115,7 @@ class LiraPlus(LiraSpf):
 
     def policy(self, driver: str) -> Policy:
         """The policy behind a driver's name: a novice that practises drives as it does alone."""
-        return self.novice.alone if driver == "novice" and self._practises else super().policy(driver)
+        return self.novice.alone if driver == Driver.NOVICE and self._practises else super().policy(driver)
 
     @property
     def _practises(self) -> bool:
@@ -131,9 +131,9 @@ class LiraPlus(LiraSpf):
         first = self.experts[0].name
         a_1 = proposal.experts[0].action
         choice = choose(None, proposal.experts, a_1, self._consensus)
-        if choice.driver == "novice":  # nobody is active, or they disagree
+        if choice.driver == Driver.NOVICE:  # nobody is active, or they disagree
             choice = replace(choice, driver=first, label=a_1 if choice.call is Call.NONE else None)
-        elif choice.driver not in (first, "mean"):
+        elif choice.driver not in (first, Driver.MEAN):
             choice = replace(choice, label=None)
         return replace(proposal, choice=choice, speed=self.settings.slow_down if choice.call is Call.FEEDBACK else 1.0)
 

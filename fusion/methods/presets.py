@@ -27,6 +27,7 @@ from lira.fusion.methods.shared_feedback import SharingSettings
 from lira.fusion.methods.syllabus import FRESH, THESIS, Syllabus
 from lira.fusion.policies.kernel import KernelSettings
 from lira.hal.errors import ConfigError, PluginError
+from lira.hal.messages import Phase
 from lira.hal.plugins import METHODS as DOOR
 
 
@@ -172,7 +173,7 @@ RIVALS = (
 HG_DAGGER = (
     Preset("hg-dagger-m10", _HG, _M10, trunks="scratch"),
     Preset("hg-dagger-mirrored", _HG, trunks="scratch", mirrored=True),
-    Preset("hg-dagger-doubt", HgDaggerSettings(doubt=("unseen",)), trunks="scratch"),
+    Preset("hg-dagger-doubt", HgDaggerSettings(doubt=(Phase.UNSEEN,)), trunks="scratch"),
     Preset("hg-dagger-trunks", _HG),
     Preset("hg-dagger-warm", _HG, warm=_BOTH),
     Preset("hg-dagger-warm-m10", _HG, _M10, warm=_BOTH),

@@ -14,12 +14,12 @@ from typing import Literal
 
 import numpy as np
 
-from lira.fusion.methods.base import Call, Choice, Lesson, Method, Policy, Proposal
+from lira.fusion.methods.base import Choice, Lesson, Method, Policy, Proposal
 from lira.fusion.methods.lira import LiraSpf
 from lira.fusion.preprocess import Features
 from lira.hal.config import Table
 from lira.hal.errors import ConfigError
-from lira.hal.messages import Action
+from lira.hal.messages import Action, Call
 
 Example = tuple[Action, Sequence[Action], Action]
 """One step of a take-over: a^H, a^1..a^n, a^N."""

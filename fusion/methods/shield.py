@@ -22,13 +22,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from lira.fusion.methods.base import STAND, Call, Choice, Lesson, Method, Policy, Proposal
+from lira.fusion.methods.base import STAND, Choice, Lesson, Method, Policy, Proposal
 from lira.fusion.preprocess import Features
 from lira.hal.errors import ConfigError
-from lira.hal.messages import Action, FloatArray
+from lira.hal.messages import Action, Call, Driver, FloatArray
 from lira.hal.profile import RobotProfile
 
-DRIVER = "shield"  # as whom a step is recorded in which it changed the turn
 HORIZON_S = 1.2  # t_T
 MARGINS_M = (0.10, 0.0)  # M, what is wished for first
 STEPS = 24  # T
@@ -113,17 +112,17 @@ class Shielded(Method):
         if clear == command:
             return proposal
         call = Call.FEEDBACK if clear == STAND else proposal.choice.call
-        return replace(proposal, choice=Choice(DRIVER, clear, call=call), speed=1.0)
+        return replace(proposal, choice=Choice(Driver.SHIELD, clear, call=call), speed=1.0)
 
     def learn(self, proposal: Proposal, human: Action | None) -> Lesson:
         """As without a shield; from what the shield did nothing is learned."""
-        if human is None and proposal.choice.driver == DRIVER:
+        if human is None and proposal.choice.driver == Driver.SHIELD:
             return Lesson(proposal.choice)
         return self._method.learn(proposal, human)
 
     def policy(self, driver: str) -> Policy:
         """Who drives from here on, to look ahead with: behind the shield."""
-        if driver == DRIVER:
+        if driver == Driver.SHIELD:
             return lambda features: self.propose(features).choice.action
         inner = self._method.policy(driver)
         return lambda features: self._shield(inner(features), features.scan)

@@ -2,8 +2,9 @@
 
 from collections.abc import Callable
 
-from lira.fusion.methods.base import STAND, Call, Choice, Method, Policy, Proposal
+from lira.fusion.methods.base import STAND, Choice, Method, Policy, Proposal
 from lira.fusion.preprocess import Features
+from lira.hal.messages import Call, Driver
 
 
 class Doubtful(Method):
@@ -17,9 +18,9 @@ class Doubtful(Method):
         """The novice's action, or to stand and call for feedback."""
         a_n = self._novice(features)
         if self._doubts(features):
-            return Proposal(features, Choice("novice", STAND, call=Call.FEEDBACK), a_n)
-        return Proposal(features, Choice("novice", a_n), a_n)
+            return Proposal(features, Choice(Driver.NOVICE, STAND, call=Call.FEEDBACK), a_n)
+        return Proposal(features, Choice(Driver.NOVICE, a_n), a_n)
 
     def policy(self, driver: str) -> Policy:
         """What would drive from here on, standing included."""
-        return {"novice": lambda features: self.propose(features).choice.action}[driver]
+        return dict[str, Policy]({Driver.NOVICE: lambda features: self.propose(features).choice.action})[driver]

@@ -1,7 +1,8 @@
 """What each task's two experts are trained on: the world, the drives, and how strict the teacher is."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
+from itertools import product
 
 import msgspec
 
@@ -102,8 +103,14 @@ def _edge(world: str, askew: Sequence[tuple[float, float]], starts: Sequence[flo
 
 
 def _table_top_depth() -> Curriculum:
-    """As the lidar expert of the line: straight on until something is in the way, be it a box or a table top."""
-    return replace(_line_lidar(), world="table-top-train")
+    """Straight on until something is in the way, be it a table top or a box; put before them askew and from afar."""
+    teacher = msgspec.structs.replace(STRICT, margin_m=0.2, horizon_s=2.0, follow_line=False)
+    askew = [(0.15, 0.0), (-0.15, 0.0), (0.3, 0.1), (-0.3, -0.1), (0.0, 0.2), (0.0, -0.2)]
+    drives = tuple(
+        Drive(Episode(layout, start_m=start_m, lateral_m=lateral, yaw_rad=yaw), 12.0, "stay")
+        for layout, (start_m, (lateral, yaw)) in enumerate(product((1.0, 5.0), askew))
+    )
+    return Curriculum("table-top-train", teacher, drives, laps=20)
 
 
 CURRICULA = {

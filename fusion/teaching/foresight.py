@@ -39,9 +39,14 @@ class Foresight(Protocol):
         """Let go of the second twin."""
 
     def rollout(
-        self, state: CourseState, policy: Callable[[Observation], Action], steps: int, period_s: float
+        self,
+        state: CourseState,
+        policy: Callable[[Observation], Action],
+        steps: int,
+        period_s: float,
+        ends: Callable[[CourseState], bool],
     ) -> list[CourseState]:
-        """Let a policy drive from `state`, with rendered sensors; ends early at a collision or lost line."""
+        """Let a policy drive from `state`, with rendered sensors; ends early at a collision, lost line, or as told."""
 
     def imagine(self, state: CourseState, actions: NDArray[np.float64], period_s: float) -> Futures:
         """Follow action sequences [N, T, 2] from `state`, without sensors."""

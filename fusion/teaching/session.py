@@ -9,10 +9,9 @@ import numpy as np
 from lira.fusion.control import HELD, ControlLoop, Step, Teacher
 from lira.fusion.log.recorder import Journal
 from lira.fusion.log.run_log import LapRecord, ResultRecord
-from lira.fusion.methods.base import Alone, Call, Method
-from lira.fusion.methods.shield import DRIVER as SHIELD
+from lira.fusion.methods.base import Alone, Method
 from lira.hal.errors import DeviceError
-from lira.hal.messages import CourseState, Episode
+from lira.hal.messages import Call, CourseState, Driver, Episode, Phase
 from lira.hal.port import Arena, Robot
 
 PUT_BACK_M = 2.0  # after a crash in training the robot starts again this far before it
@@ -88,7 +87,7 @@ class Tally:
 class Session:
     """Teaches one apprentice on one robot.
 
-    `alone` says who drives in a phase without the teacher, "prove" or "unseen": the novice, if it is not given. Without
+    `alone` says who drives in a phase without the teacher: the novice, if it is not given. Without
     an apprentice there is nobody to teach, only `alone` to be shown.
     """
 
@@ -99,14 +98,14 @@ class Session:
         loop: ControlLoop,
         journal: Journal,
         apprentice: Method | None,
-        alone: Callable[[str], Method] | None = None,
+        alone: Callable[[Phase], Method] | None = None,
     ) -> None:
         self._robot = robot
         self._arena = arena
         self._loop = loop
         self._journal = journal
         self._apprentice = apprentice
-        self._driver = alone or (lambda _: Alone("novice", self._pupil.novice.alone))
+        self._driver = alone or (lambda _: Alone(Driver.NOVICE, self._pupil.novice.alone))
         self._began_s = robot.now()
         self._laps = 0
 
@@ -126,28 +125,28 @@ class Session:
     def train(self, course: Course, teacher: Teacher | None, lap: int) -> None:
         """One training lap, numbers counting from 1."""
         self._laps = lap
-        self._lap(self._pupil, course.taught(lap), "train", lap, teacher)
+        self._lap(self._pupil, course.taught(lap), Phase.TRAIN, lap, teacher)
         self._pupil.reset()  # the lap is over: who learns by laps learns now
 
     def prove(self, course: Course, lap: int = 1) -> bool:
         """The proving runs that belong to a lap, until it is plain how they end. Returns whether enough were passed."""
         failed = 0
         for drives in course.proven(lap):
-            failed += not self._alone(drives, "prove", lap).passed
+            failed += not self._alone(drives, Phase.PROVE, lap).passed
             if failed > course.spare:
                 return False
         return True
 
     def score(self, runs: Sequence[Sequence[Drive]], lap: int) -> list[LapRecord]:
         """Proving runs after a lap, whatever becomes of the others."""
-        return [self._alone(drives, "prove", lap) for drives in runs]
+        return [self._alone(drives, Phase.PROVE, lap) for drives in runs]
 
     def show(self, drives: Sequence[Drive], teacher: Teacher | None = None) -> list[LapRecord]:
         """Let the frozen novice drive, each drive a lap of its own; after a crash it goes on behind it.
 
         The teacher, if there is one, answers a robot that stands in doubt, and takes control as it would in training.
         """
-        return [self._alone([drive], "unseen", lap, teacher) for lap, drive in enumerate(drives, start=1)]
+        return [self._alone([drive], Phase.UNSEEN, lap, teacher) for lap, drive in enumerate(drives, start=1)]
 
     def result(self, converged: bool, proof: str = "own") -> ResultRecord:
         """Sum the session up; `proof` says what `converged` means, as in `fusion.syllabus`."""
@@ -178,15 +177,17 @@ class Session:
     def _training_steps(self) -> int:
         return 0 if self._apprentice is None else self._apprentice.novice.training_steps
 
-    def _alone(self, drives: Sequence[Drive], phase: str, lap: int, teacher: Teacher | None = None) -> LapRecord:
+    def _alone(self, drives: Sequence[Drive], phase: Phase, lap: int, teacher: Teacher | None = None) -> LapRecord:
         return self._lap(self._driver(phase), drives, phase, lap, teacher)
 
-    def _lap(self, method: Method, drives: Sequence[Drive], phase: str, lap: int, teacher: Teacher | None) -> LapRecord:
+    def _lap(
+        self, method: Method, drives: Sequence[Drive], phase: Phase, lap: int, teacher: Teacher | None
+    ) -> LapRecord:
         tally = Tally()
         began_s = self._robot.now()
         for drive in drives:
             self._drive(method, drive, phase, lap, teacher, tally)
-            if phase == "prove" and not tally.passed:
+            if phase == Phase.PROVE and not tally.passed:
                 break
         ledger = self._journal.ledger
         record = LapRecord(
@@ -211,7 +212,9 @@ class Session:
         self._journal.write(record)
         return record
 
-    def _drive(self, method: Method, drive: Drive, phase: str, lap: int, teacher: Teacher | None, tally: Tally) -> None:
+    def _drive(
+        self, method: Method, drive: Drive, phase: Phase, lap: int, teacher: Teacher | None, tally: Tally
+    ) -> None:
         """One episode, with the robot put back after a crash unless this is a proving run."""
         self._begin(drive.episode, method, teacher)
         end_s = self._robot.now() + drive.limit_s
@@ -221,7 +224,7 @@ class Session:
             step = self._step(method, teacher)
             if step is None:
                 tally.collisions += 1
-                if phase == "prove":
+                if phase == Phase.PROVE:
                     return
                 self._begin(_after_crash(drive.episode, self._arena.state(), phase), method, teacher)
                 continue
@@ -233,12 +236,12 @@ class Session:
                 training_steps=self._training_steps,
             )
             tally.steps += 1
-            tally.human_steps += step.lesson.choice.driver == "human"
-            tally.shielded += step.proposal.choice.driver == SHIELD
-            stands = phase != "train" and step.proposal.choice.call is Call.FEEDBACK
+            tally.human_steps += step.lesson.choice.driver == Driver.HUMAN
+            tally.shielded += step.proposal.choice.driver == Driver.SHIELD
+            stands = phase != Phase.TRAIN and step.proposal.choice.call is Call.FEEDBACK
             tally.stops += stands and not stood
             stood = stands
-            if stands and phase == "prove":  # nobody is there to answer
+            if stands and phase == Phase.PROVE:  # nobody is there to answer
                 tally.unfinished += 1
                 return
             state = self._arena.state()
@@ -249,7 +252,7 @@ class Session:
             if state.collided or state.lost:
                 tally.collisions += state.collided
                 tally.lost += state.lost
-                if phase == "prove":
+                if phase == Phase.PROVE:
                     return
                 self._begin(_after_crash(drive.episode, state, phase), method, teacher)
         out = state.finished or (drive.goal == "leave" and state.lost)
@@ -282,9 +285,9 @@ class Session:
         )
 
 
-def _after_crash(episode: Episode, state: CourseState, phase: str) -> Episode:
+def _after_crash(episode: Episode, state: CourseState, phase: Phase) -> Episode:
     """Where the robot is put down after a crash to go on with the lap: before it to try again, or behind it."""
     if not np.isfinite(state.progress_m):
         return episode
-    shift = -PUT_BACK_M if phase == "train" else PUT_ON_M
+    shift = -PUT_BACK_M if phase == Phase.TRAIN else PUT_ON_M
     return Episode(episode.layout, start_m=max(0.0, state.progress_m + shift), began_m=episode.start_m)

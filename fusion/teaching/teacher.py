@@ -14,12 +14,12 @@ import numpy as np
 from msgspec import Meta
 from numpy.typing import NDArray
 
-from lira.fusion.methods.base import STAND, Call, Policy, Proposal
+from lira.fusion.methods.base import STAND, Policy, Proposal
 from lira.fusion.preprocess import Preprocessor
 from lira.fusion.teaching.foresight import Foresight
 from lira.fusion.teaching.planner import COMFORT_M, Planner
 from lira.hal.config import Table
-from lira.hal.messages import Action, CourseState, Observation
+from lira.hal.messages import Action, Call, CourseState, Observation
 from lira.hal.profile import RobotProfile
 
 Share = Annotated[float, Meta(ge=0.0, le=1.0)]
@@ -131,16 +131,16 @@ class ScriptedTeacher:
 
     def _goes_wrong(self, state: CourseState, policy: Policy) -> bool:
         """Whether the policy would hit something, lose the line, turn back or stand, at its full speed."""
-        drive = self._foresight.rollout(state, self._seeing(policy), self._steps, self._period_s)
-        unsafe = any(
-            each.collided
-            or each.clearance_m < self._settings.margin_m
-            or bool(self._off_line(np.asarray(each.lateral_m), np.asarray(each.clearance_m)))
-            for each in drive
-        )
-        follows = self._settings.follow_line
-        aimless = self._turns_back(state, drive) if follows else self._wanders(state, drive)
-        return unsafe or aimless or self._stalls(state, drive)
+        drive = self._foresight.rollout(state, self._seeing(policy), self._steps, self._period_s, self._unsafe)
+        if self._unsafe(drive[-1]):
+            return True
+        aimless = self._turns_back(state, drive) if self._settings.follow_line else self._wanders(state, drive)
+        return aimless or self._stalls(state, drive)
+
+    def _unsafe(self, state: CourseState) -> bool:
+        """Whether it is too near to a box or too far from the line: what comes after it changes nothing."""
+        off = self._off_line(np.asarray(state.lateral_m), np.asarray(state.clearance_m))
+        return state.collided or state.clearance_m < self._settings.margin_m or bool(off)
 
     def _turns_back(self, state: CourseState, drive: list[CourseState]) -> bool:
         """Whether the policy drives along the line the wrong way; never where there is no line."""

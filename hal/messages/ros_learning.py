@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from lira.hal.messages import Action, CourseState, Decision, ExpertView, LabelCounts
+from lira.hal.messages import Action, Call, CourseState, Decision, ExpertView, LabelCounts, Phase
 from lira.hal.messages.ros_types import Codec, header, ros, stamp
 
 _COURSE_FIELDS = tuple(CourseState.__dataclass_fields__)[1:]
@@ -30,8 +30,8 @@ def _decision_to(m: Decision) -> Any:
     return ros("lira_msgs/msg/Decision")(
         header=header(m.stamp_s, "base_link"),
         observation=m.observation,
-        driver=m.driver,
-        call=m.call,
+        driver=str(m.driver),
+        call=str(m.call),
         executed=np.array(m.executed, np.float64),
         novice=np.array(m.novice, np.float64),
         has_human=m.human is not None,
@@ -42,7 +42,7 @@ def _decision_to(m: Decision) -> Any:
         training_steps=m.training_steps,
         interventions=m.interventions,
         calls=m.calls,
-        phase=m.phase,
+        phase=str(m.phase),
         lap=m.lap,
     )
 
@@ -52,7 +52,7 @@ def _decision_from(message: Any) -> Decision:
         stamp_s=stamp(message),
         observation=message.observation,
         driver=message.driver,
-        call=message.call,
+        call=Call(message.call),
         executed=_action_from(message.executed),
         novice=_action_from(message.novice),
         human=_action_from(message.human) if message.has_human else None,
@@ -62,7 +62,7 @@ def _decision_from(message: Any) -> Decision:
         training_steps=message.training_steps,
         interventions=message.interventions,
         calls=message.calls,
-        phase=message.phase,
+        phase=Phase(message.phase),
         lap=message.lap,
     )
 

@@ -9,8 +9,8 @@ from dataclasses import replace
 import msgspec
 
 from lira.hal.clock import is_fresh
-from lira.hal.messages import Applied, Command, LaserScan, Observation, Reason
-from lira.hal.port import DeviceHealth, DeviceMonitor, MotorSwitch, Robot, SensorEvents
+from lira.hal.messages import Applied, Command, DiagnosticStatus, LaserScan, Observation, Reason
+from lira.hal.port import DeviceHealth, DeviceMonitor, MotorSwitch, Robot, SelfDiagnosis, SensorEvents
 from lira.hal.profile import Field, RobotProfile
 from lira.hal.safety.arming import State
 from lira.hal.safety.governor import Governor
@@ -60,6 +60,11 @@ class GovernedRobot:
     def losses(self) -> int:
         """How often a device was lost."""
         return self._health().losses
+
+    @property
+    def diagnostics(self) -> tuple[DiagnosticStatus, ...]:
+        """What its devices say of themselves, where they do."""
+        return self._robot.diagnostics() if isinstance(self._robot, SelfDiagnosis) else ()
 
     def open(self) -> None:
         """Bring the devices up."""

@@ -3,6 +3,7 @@
 import sys
 import threading
 import time
+from dataclasses import replace
 
 from lira.hal.bus.access_log import FULL, LINK
 from lira.hal.bus.bus import Bus
@@ -57,7 +58,12 @@ class Reporter:
             self._said = trouble
             self._tell_of_strangers()
             now_s = self._robot.now()
-            self._publisher.put(DiagnosticArray(now_s, (self._governor(), self._link(trouble))), now_s)
+            told = (self._governor(), self._link(trouble), *self._devices())
+            self._publisher.put(DiagnosticArray(now_s, told), now_s)
+
+    def _devices(self) -> list[DiagnosticStatus]:
+        """What the robot's devices say, under its name."""
+        return [replace(status, name=f"{self._bus.robot}: {status.name}") for status in self._robot.diagnostics]
 
     def _trouble(self, now_s: float) -> str:
         """What is wrong with the links: the worst of it, "" for nothing."""

@@ -8,17 +8,28 @@ from lira.hal.errors import DeviceError, SensorError
 from lira.hal.messages import BatteryState, Imu, Odometry, Range
 from lira.robot.core2 import messages
 from lira.robot.core2.config_calls import Errands
-from lira.robot.core2.rosserial import Frame, Id, TopicInfo, encode_frame, encode_strings, encode_time, parse_topic_info
+from lira.robot.core2.rosserial import (
+    Frame,
+    Id,
+    TopicInfo,
+    encode_frame,
+    encode_strings,
+    encode_time,
+    parse_answer,
+    parse_topic_info,
+)
+from lira.robot.core2.stamps import Stamps
 from lira.robot.core2.wheels import Reckoner
 from lira.robot.settings import BaseSettings
 
-# The board stamps with the time we gave it; what it says is believed if it is a plausible time before now.
-OLDEST_STAMP_S = 0.25
 CONFIG_MD5S = {
     Id.SERVICE_REQUESTS: messages.CONFIG_REQUEST_MD5,
     Id.SERVICE_ANSWERS: messages.CONFIG_ANSWER_MD5,
 }
 FIRMWARE = "Flash the ROSbot firmware 0.14.3 to 0.16.2."
+ASK_KINEMATICS, DIFFERENTIAL, MECANUM = "GKIN", "DIFF", "MEC"
+BANNER = "firmware"
+UNKNOWN = 2  # result of a call that the firmware has no word for
 
 
 @dataclass(slots=True)
@@ -41,6 +52,7 @@ class Board:
 
     def __init__(self, settings: BaseSettings) -> None:
         self._reckoner = Reckoner(settings)
+        self._stamps = Stamps()
         self.readings = Readings()
         self.read = self.announced = 0  # messages on topics that it announced, and announcements
         self.unreadable = 0  # messages that did not decode
@@ -55,6 +67,8 @@ class Board:
         self._refused: dict[str, TopicInfo] = {}
         self._asked_time_s: float | None = None
         self._velocity = (0.0, 0.0, 0.0)
+        self.kinematics: str | None = None  # "DIFF" or "MEC", once it has said so
+        self._stamps.forget()
         self.cmd_vel: int | None = None
         self._config: int | None = None
         self._config_answers: int | None = None
@@ -84,6 +98,12 @@ class Board:
             return wrong_layout(next(iter(self._refused.values())))
         return DeviceError(f"the base board lacks {', '.join(self.missing) or 'config'}", FIRMWARE)
 
+    @property
+    def banner(self) -> str:
+        """What its firmware said of itself, in one line; "" if that was not heard."""
+        told = next((text for text in reversed(self.log) if BANNER in text.lower()), "")
+        return " ".join("".join(each if each.isprintable() else " " for each in told).split())[:80]
+
     def configure(self, command: str, data: str = "") -> None:
         """Have the board's service `config` called, until it answers; what it says comes into `answers`."""
         self._errands.want(command, data)
@@ -103,6 +123,8 @@ class Board:
             return b""
         asked_s, self._asked_time_s = self._asked_time_s, None
         time = b"" if asked_s is None else encode_time(asked_s)
+        if time:
+            self._stamps.told(now_s)
         return time + self._errands.due(now_s, lambda *texts: encode_frame(config, encode_strings(*texts)))
 
     def handle(self, frame: Frame, now_s: float) -> None:
@@ -114,11 +136,23 @@ class Board:
         elif frame.topic == Id.LOG:
             self.log = [*self.log[-19:], frame.payload[5:].decode("utf-8", "replace")]
         elif frame.topic == self._config_answers:
-            self.answers = [*self.answers[-19:], frame.payload[4:-1].decode("utf-8", "replace")]
-            self._errands.answered()
+            self._hear_answer(frame.payload)
         elif frame.topic in self._layouts:
             self.read += 1
             self._read(*self._layouts[frame.topic], frame.payload, now_s)
+
+    def _hear_answer(self, payload: bytes) -> None:
+        try:
+            data, result = parse_answer(payload)
+        except ValueError:
+            self.unreadable += 1
+            return
+        self.answers = [*self.answers[-19:], data]
+        if self._errands.answered() == ASK_KINEMATICS:
+            if data in (DIFFERENTIAL, MECANUM):
+                self.kinematics = data
+            elif result == UNKNOWN:
+                self.kinematics = DIFFERENTIAL  # firmware that knows no other
 
     def _learn(self, way: Id, payload: bytes) -> None:
         try:
@@ -167,34 +201,33 @@ class Board:
         elif topic == "pose":
             pose = messages.pose_of(message)
             finite(pose.x_m, pose.y_m, pose.yaw_rad)
-            odom = self._reckoner.step(pose, self._velocity, stamp_of(message, now_s))
+            in_body = self.kinematics == MECANUM
+            odom = self._reckoner.step(pose, self._velocity, self._stamp(topic, message, now_s), in_body=in_body)
             finite(odom.linear_m_s, odom.angular_rad_s)
             readings.odom = odom
         elif topic == "imu":
-            imu = messages.imu_of(message, stamp_of(message, now_s))
+            imu = messages.imu_of(message, self._stamp(topic, message, now_s))
             finite(imu.yaw_rad, imu.angular_rad_s, imu.linear_m_s2, imu.lateral_m_s2)
             readings.imu = imu
         elif topic == "battery":
-            battery = messages.battery_of(message, stamp_of(message, now_s))
+            battery = messages.battery_of(message, self._stamp(topic, message, now_s))
             finite(battery.voltage_v)
             readings.battery = battery
         elif topic == "buttons":
             readings.buttons = message.data
         else:
-            reading = messages.range_of(message, topic, stamp_of(message, now_s))
+            reading = messages.range_of(message, topic, self._stamp(topic, message, now_s))
             readings.ranges[reading.frame_id] = reading
+
+    def _stamp(self, topic: str, message: Any, now_s: float) -> float:
+        said = message.header.stamp
+        return self._stamps.of(topic, float(said.sec + said.nanosec * 1e-9), now_s)
 
 
 def finite(*values: float) -> None:
     """Raise `SensorError` if one of the values is not finite."""
     if not all(map(math.isfinite, values)):
         raise SensorError(f"the board measured {values}")
-
-
-def stamp_of(message: Any, now_s: float) -> float:
-    """When a message was captured, on our clock: as it says, unless its clock is not ours yet."""
-    stamp_s = float(message.header.stamp.sec + message.header.stamp.nanosec * 1e-9)
-    return stamp_s if now_s - OLDEST_STAMP_S <= stamp_s <= now_s else now_s
 
 
 def wrong_layout(info: TopicInfo) -> DeviceError:

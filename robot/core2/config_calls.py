@@ -26,11 +26,17 @@ class Errands:
         """Have a command called; what it was to be called with before no longer counts."""
         self._waiting[command] = data
 
-    def answered(self) -> None:
-        """The board has answered the call that is under way."""
-        if self._under_way is not None and self._under_way in self._waiting.items():
-            del self._waiting[self._under_way[0]]
-        self._under_way = None
+    def answered(self) -> str:
+        """The board has answered the call that is under way; returns its command, "" if there was none.
+
+        Where a call was repeated its second answer is taken for that of the next one.
+        """
+        call, self._under_way = self._under_way, None
+        if call is None:
+            return ""
+        if call in self._waiting.items():
+            del self._waiting[call[0]]
+        return call[0]
 
     def due(self, now_s: float, encode: Callable[[str, str], bytes]) -> bytes:
         """Return the frame that has to go out now; nothing while an answer may still come."""

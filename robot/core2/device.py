@@ -8,9 +8,9 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from lira.hal.errors import DeviceError
-from lira.hal.messages import STOP, Twist
+from lira.hal.messages import STOP, DiagnosticStatus, Twist
 from lira.robot.core2 import messages
-from lira.robot.core2.board import FIRMWARE, Board, Readings
+from lira.robot.core2.board import ASK_KINEMATICS, FIRMWARE, MECANUM, Board, Readings
 from lira.robot.core2.contact import SILENCE_S, Contact, State
 from lira.robot.core2.rosserial import ASK_TOPICS, encode_frame, parse_frames
 from lira.robot.core2.watchdog import WatchdogProcess
@@ -102,6 +102,23 @@ class Core2:
             self._motors_off = off
         self._news.set()
 
+    def diagnostics(self) -> DiagnosticStatus:
+        """What the board is, how well it is heard, and how often it began anew."""
+        board, counts = self._board, self.counts
+        odom, battery = board.readings.odom, board.readings.battery
+        values = [("device", self._url), ("baud", str(self.baud or "the line's own")), ("banner", board.banner)]
+        values += [("kinematics", board.kinematics or "unknown"), ("negotiations", str(counts.negotiations))]
+        values += [("losses", str(self.losses)), ("frames", str(counts.frames)), ("bytes lost", str(counts.lost_bytes))]
+        values += [("messages unreadable", str(board.unreadable)), ("answers", "; ".join(board.answers[-3:]))]
+        if odom is not None:
+            values.append(("odometry age s", f"{time.monotonic() - odom.stamp_s:.3f}"))
+        if battery is not None:
+            values.append(("battery V", f"{battery.voltage_v:.2f}"))
+        message = "ok"
+        if board.kinematics == MECANUM:
+            message = "mecanum firmware: motion to the side is not reckoned with"
+        return DiagnosticStatus(0 if message == "ok" else 1, "base", message, tuple(values))
+
     def session(self, stop: threading.Event, begin: Callable[[], None]) -> None:
         """Open, drive until `stop` is set or the board is lost, and leave it still. Raises `DeviceError`."""
         self._board.forget()  # whatever is at this line now has announced nothing
@@ -134,7 +151,7 @@ class Core2:
                     return buffer
         if heard:
             what = f"what is at {self._url} is no CORE2 with ROSbot firmware"
-            raise DeviceError(what, f"Is it the base's port? {FIRMWARE}")
+            raise DeviceError(what, f"Is it the base's port? If it is and does not just boot: {FIRMWARE}")
         raise DeviceError(f"no base board answers at {self._url}", POWER)
 
     def _serve(self, line: Line, buffer: bytes, stop: threading.Event, begin: Callable[[], None]) -> None:
@@ -245,12 +262,15 @@ class Core2:
         line.write(self._frame_of(twist))
         self._sent_s = now_s
         self.counts.commands += 1
-        if not silent and now_s >= self._call_s:
+        called = not silent and now_s >= self._call_s
+        if called:
             self._call_s = now_s + CALL_S
             self._board.configure("EWCH", "1")
         if not silent and self._motors_told is not off and (braked or not off):
             self._motors_told = off
             self._board.configure("EMOT", "0" if off else "1")
+        if called and self._board.kinematics is None:  # last: nothing waits for it
+            self._board.configure(ASK_KINEMATICS)
         return now_s
 
     def _frame_of(self, twist: Twist) -> bytes:

@@ -115,6 +115,13 @@ def parse_topic_info(payload: bytes) -> TopicInfo:
     return TopicInfo(topic, name, kind, md5, buffer_size)
 
 
+def parse_answer(payload: bytes) -> tuple[str, int]:
+    """Read an answer of `config`: data and result. Raises `ValueError` if it is none."""
+    if len(payload) < 5 or int.from_bytes(payload[:4], "little") != len(payload) - 5:
+        raise ValueError(f"{len(payload)} bytes are no answer")
+    return payload[4:-1].decode("utf-8", "replace"), payload[-1]
+
+
 def encode_strings(*texts: str) -> bytes:
     """Pack strings as ROS does: length and bytes."""
     return b"".join(struct.pack("<I", len(data)) + data for data in (text.encode() for text in texts))

@@ -31,13 +31,19 @@ class Reckoner:
         """The board counts anew: its next pose is where the robot is."""
         self._reported = None
 
-    def step(self, reported: Pose, velocity: tuple[float, float, float], stamp_s: float) -> Odometry:
-        """Take a pose, and the velocity (x, y in the odom frame, m/s, and yaw, rad/s) that belongs to it."""
+    def step(
+        self, reported: Pose, velocity: tuple[float, float, float], stamp_s: float, *, in_body: bool = False
+    ) -> Odometry:
+        """Take a pose, and the velocity (x, y, m/s, and yaw, rad/s) that belongs to it.
+
+        The velocity is in the odom frame, with mecanum firmware in the body's (`in_body`).
+        """
         before, self._reported = self._reported, reported
         if before is not None:
             self._advance(before, reported)
         x_m_s, y_m_s, turn_rad_s = velocity
-        ahead_m_s = x_m_s * math.cos(reported.yaw_rad) + y_m_s * math.sin(reported.yaw_rad)
+        yaw_rad = 0.0 if in_body else reported.yaw_rad
+        ahead_m_s = x_m_s * math.cos(yaw_rad) + y_m_s * math.sin(yaw_rad)
         settings, pose = self._settings, self._pose
         return Odometry(
             stamp_s,

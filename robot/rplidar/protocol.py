@@ -36,6 +36,7 @@ class Answer(IntEnum):
     EXPRESS = 0x82
     ULTRA = 0x84
     DENSE = 0x85
+    ACC_BOARD = 0xFF
 
 
 class Conf(IntEnum):
@@ -45,6 +46,7 @@ class Conf(IntEnum):
     US_PER_SAMPLE = 0x71
     ANSWER_TYPE = 0x75
     TYPICAL_MODE = 0x7C
+    MODE_NAME = 0x7F
 
 
 class Health(IntEnum):
@@ -91,6 +93,11 @@ def encode_motor(pwm: int) -> bytes:
 def encode_conf(entry: Conf, mode: int | None = None) -> bytes:
     """Ask for an entry of the configuration, of one scan mode where it belongs to one."""
     return encode_request(Request.CONF, struct.pack("<I", entry) + (b"" if mode is None else struct.pack("<H", mode)))
+
+
+def encode_acc_board() -> bytes:
+    """Ask whether the board between the unit and the line drives the motor."""
+    return encode_request(Request.ACC_BOARD, bytes(4))
 
 
 def encode_express(mode: int) -> bytes:
@@ -165,8 +172,13 @@ def parse_sample_rate(body: bytes) -> tuple[float, float]:
     return standard_us * 1e-6, express_us * 1e-6
 
 
-def parse_conf(body: bytes, entry: Conf) -> int | None:
-    """Read a CONF answer of one number; None if it answers another question or has no value."""
+def parse_conf(body: bytes, entry: Conf) -> bytes | None:
+    """Read a CONF answer; None if it answers another question or has no value."""
     if len(body) < 5 or struct.unpack_from("<I", body)[0] != entry:
         return None
-    return int.from_bytes(body[4:8], "little")
+    return body[4:]
+
+
+def parse_acc_board(body: bytes) -> bool:
+    """Read the 4 bytes of an ACC_BOARD answer: whether the motor hears what it is told."""
+    return bool(body[0] & 1)

@@ -1,18 +1,21 @@
 """Turns of the lidar: points become scans with beams at fixed angles, in the robot's frame."""
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from lira.hal.messages import FloatArray, LaserScan
 from lira.hal.profile import Lidar
-from lira.robot.rplidar.points import Floats
+from lira.robot.rplidar.points import FASTEST_HZ, LONGEST_SAMPLE_S, Floats
 
-# A turn with fewer points than this share of its beams has lost too much to be shown.
-LEAST_SHARE = 0.3
+# A turn that shows less than this share of its beams has lost too much to be shown.
+LEAST_SHARE = 0.5
 # More than half a turn without a point, and nobody knows which turn the next one belongs to.
 SLOWEST_HZ = 2.0
+# Points do not lie further apart than this; what is wider is a hole.
+WIDEST_RAD = math.tau * FASTEST_HZ * LONGEST_SAMPLE_S
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,10 +40,14 @@ class Turn:
 
 
 class TurnCutter:
-    """Cuts a stream of points into turns. The first, incomplete one is dropped."""
+    """Cuts a stream of points into turns. The first, incomplete one is dropped.
 
-    def __init__(self, mounting: Mounting) -> None:
+    `back_rad`: how far the angles of a stream may step back. A turn is closed when the head is so far past the seam.
+    """
+
+    def __init__(self, mounting: Mounting, back_rad: float = 0.0) -> None:
         self._mounting = mounting
+        self._back_rad = back_rad
         self._sign = 1.0 if mounting.mirror else -1.0
         # The unit's angle at which it looks straight behind the robot.
         self._seam_rad = self._sign * (math.pi - mounting.yaw_offset_rad)
@@ -48,9 +55,17 @@ class TurnCutter:
 
     def restart(self) -> None:
         """Forget the turn that has begun."""
-        self._swept_rad: float | None = None
+        self._swept_rad: float | None = None  # of the newest point, since the seam at which the turn at hand began
+        self._furthest_rad = 0.0
         self._newest_s = -math.inf
-        self._pieces: list[tuple[Floats, Floats, Floats]] | None = None
+        self._whole = False  # the turn at hand was seen from its start
+        self._pieces: list[Turn] = []  # of the turn at hand
+        self._early: list[Turn] = []  # of the next one
+
+    @property
+    def swept_rad(self) -> float:
+        """How far the head has come since the turn at hand began."""
+        return self._furthest_rad
 
     def add(self, theta_rad: Floats, distance_m: Floats, time_s: Floats) -> list[Turn]:
         """Take points in the order of time, and return the turns that they complete."""
@@ -61,52 +76,73 @@ class TurnCutter:
         self._newest_s = float(time_s[-1])
         # Angles since the seam without jumps; to sweep back over the seam does not begin the turn again.
         before = [] if self._swept_rad is None else [self._swept_rad]
-        swept = np.unwrap(np.concatenate([before, (theta_rad - self._seam_rad) % math.tau]))
-        furthest = np.maximum.accumulate(swept)
-        self._swept_rad = float(furthest[-1])
-        turns = np.floor(furthest / math.tau)
-        first = turns[0]
-        turns = turns[len(before) :]
+        swept = np.unwrap(np.concatenate([before, (theta_rad - self._seam_rad) % math.tau]))[len(before) :]
+        bearing_rad = self._sign * theta_rad + self._mounting.yaw_offset_rad
+        points = Turn((bearing_rad + math.pi) % math.tau - math.pi, distance_m, time_s)
+        if swept[-1] < -math.pi:  # heads do not turn back: what came between was none of it
+            self.restart()
+            return []
+        furthest_rad, swept_rad = max(self._furthest_rad, float(swept.max())), float(swept[-1])
         turned = []
-        for number in range(int(first), int(turns[-1]) + 1):
-            if number > first:
-                turned += self._finish()
-            mine = turns == number
-            if self._pieces is not None:
-                self._pieces.append((theta_rad[mine], distance_m[mine], time_s[mine]))
-        # Small numbers stay exact.
-        self._swept_rad %= math.tau
+        while furthest_rad >= math.tau + self._back_rad:
+            mine = swept < math.tau
+            self._pieces.append(_some(points, mine))
+            turned += self._finish()
+            points, swept = _some(points, ~mine), swept[~mine] - math.tau
+            furthest_rad, swept_rad = furthest_rad - math.tau, swept_rad - math.tau
+        mine = swept < math.tau
+        self._pieces.append(_some(points, mine))
+        self._early.append(_some(points, ~mine))
+        self._furthest_rad, self._swept_rad = furthest_rad, swept_rad
         return turned
 
     def _finish(self) -> list[Turn]:
         """Close the turn at hand, if it was seen from its start, and begin the next."""
-        pieces, self._pieces = self._pieces, []
-        if not pieces:
-            return []
-        theta_rad, distance_m, time_s = (np.concatenate(parts) for parts in zip(*pieces, strict=True))
-        bearing_rad = self._sign * theta_rad + self._mounting.yaw_offset_rad
-        return [Turn((bearing_rad + math.pi) % math.tau - math.pi, distance_m, time_s)]
+        pieces, self._pieces, self._early = self._pieces, self._early, []
+        whole, self._whole = self._whole, True
+        return [_together(pieces)] if whole else []
 
 
-def scan_of(turn: Turn, lidar: Lidar) -> LaserScan | None:
-    """Put a turn's points to the profile's beams; None if too few are left of it.
+def _some(turn: Turn, which: NDArray[np.bool_]) -> Turn:
+    return Turn(turn.bearing_rad[which], turn.distance_m[which], turn.time_s[which])
 
-    Of several points in a beam the nearest counts; a beam without one is nan. Ranges after REP-117. The stamp is that
-    of the first beam, and `time_increment` is negative where the lidar turns clockwise.
+
+def _together(pieces: list[Turn]) -> Turn:
+    names = ("bearing_rad", "distance_m", "time_s")
+    return Turn(*(np.concatenate([getattr(piece, name) for piece in pieces]) for name in names))
+
+
+def scan_of(turn: Turn, lidar: Lidar, *, ascending_time: bool = False) -> LaserScan | None:
+    """Put a turn's points to the profile's beams; None if too much of it is missing.
+
+    Of several returns in a beam the nearest counts. A beam that no return fell into has the nearer of those beside it,
+    no further away than points or beams lie apart: there are beams between the points of a slow mode. What is left is
+    nan: there the unit has measured nothing, or its points were lost. Ranges after REP-117.
+
+    The stamp is that of the first beam. The lidar turns clockwise, so that `time_increment` is negative; with
+    `ascending_time` it is positive, and `angle_increment` is negative.
     """
     increment_rad = lidar.increment_rad
     index = np.rint((turn.bearing_rad + lidar.fov_rad / 2) / increment_rad).astype(np.int64)
     if lidar.full_turn:
         index %= lidar.beams
     inside = (index >= 0) & (index < lidar.beams)
-    if np.count_nonzero(inside) < LEAST_SHARE * lidar.beams:
+    if not inside.any():
         return None
-    index, distance_m, time_s = index[inside], turn.distance_m[inside], turn.time_s[inside]
+    middle_rad: Floats = -lidar.fov_rad / 2 + increment_rad * np.arange(lidar.beams, dtype=np.float64)
+    reach_rad = max(2 * increment_rad, 1.5 * min(math.tau / len(index), WIDEST_RAD))
+    seen = np.isfinite(nearest_beside(turn.bearing_rad, np.ones(len(index)), middle_rad, reach_rad))
+    if np.count_nonzero(seen) < LEAST_SHARE * lidar.beams:
+        return None
+    returns = turn.distance_m > 0.0
     ranges = np.full(lidar.beams, np.nan)
-    np.fmin.at(ranges, index, np.where(distance_m > 0.0, distance_m, np.nan))
+    fell = inside & returns
+    np.fmin.at(ranges, index[fell], turn.distance_m[fell])
+    empty = np.isnan(ranges)
+    ranges[empty] = nearest_beside(turn.bearing_rad[returns], turn.distance_m[returns], middle_rad[empty], reach_rad)
     time_increment_s = _slope(turn) * increment_rad
-    return LaserScan(
-        stamp_s=float(np.mean(time_s - index * time_increment_s)),
+    scan = LaserScan(
+        stamp_s=float(np.mean(turn.time_s[inside] - index[inside] * time_increment_s)),
         angle_min=-lidar.fov_rad / 2,
         angle_increment=increment_rad,
         range_min=lidar.range_min_m,
@@ -114,6 +150,34 @@ def scan_of(turn: Turn, lidar: Lidar) -> LaserScan | None:
         ranges=_rep117(ranges, lidar),
         scan_time=float(turn.time_s[-1] - turn.time_s[0]),
         time_increment=time_increment_s,
+    )
+    return reverse(scan) if ascending_time and time_increment_s < 0.0 else scan
+
+
+def nearest_beside(bearing_rad: Floats, distance_m: Floats, middle_rad: Floats, reach_rad: float) -> Floats:
+    """Of the points [n] next to each direction [m], left and right, the nearer one's distance; nan beyond reach."""
+    if not len(bearing_rad):
+        return np.full(len(middle_rad), np.nan)
+    order = np.argsort(bearing_rad)
+    bearing_rad, distance_m = bearing_rad[order], distance_m[order]
+    after = np.searchsorted(bearing_rad, middle_rad)
+    found = np.full(len(middle_rad), np.nan)
+    for beside in (after - 1, after % len(bearing_rad)):
+        apart_rad = np.abs((bearing_rad[beside] - middle_rad + math.pi) % math.tau - math.pi)
+        found = np.fmin(found, np.where(apart_rad <= reach_rad, distance_m[beside], np.nan))
+    return found
+
+
+def reverse(scan: LaserScan) -> LaserScan:
+    """The same scan with its beams in the other order."""
+    last = len(scan.ranges) - 1
+    return replace(
+        scan,
+        stamp_s=scan.stamp_s + last * scan.time_increment,
+        angle_min=scan.angle_min + last * scan.angle_increment,
+        angle_increment=-scan.angle_increment,
+        ranges=np.ascontiguousarray(scan.ranges[::-1]),
+        time_increment=-scan.time_increment,
     )
 
 

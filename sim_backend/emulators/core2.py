@@ -16,7 +16,7 @@ BOOT_S = 2.0
 BOOT_TEXT = b"\x00\xffrosbot firmware 0.16.2\r\n" + bytes(range(0x80, 0xFF))
 RING_SIZE = 768  # what comes while nobody reads waits in the serial port; what exceeds it is lost
 WATCHDOG_S = 1.0
-DRIVE_S = 0.1  # a target is repeated to the wheels, which may have a watchdog of their own
+DRIVE_S = 0.01  # its regulators work so often; a target is repeated to the wheels
 ASK_TIME_S = 2.5
 GIVE_UP_S = 11.0  # without an answer to the question for the time
 POSE_S, SLOW_S, BATTERY_S = 0.05, 0.1, 0.4
@@ -67,6 +67,7 @@ class Firmware:
 
     baud: int = 525000
     boot_s: float = BOOT_S
+    kinematics: str = "DIFF"  # or MEC: the image for mecanum wheels
     md5s: tuple[tuple[str, str], ...] = ()
 
 
@@ -103,7 +104,7 @@ class Core2Unit:
         self.configured = False
         self.watchdog = self.motors = True
         self.joint_states = False
-        self.kinematics = "DIFF"
+        self.kinematics = self.firmware.kinematics
         self.target = STOP
         self.obeyed_unannounced = 0  # commands that came when it ran again and had announced nothing
         self.commanded_s = -math.inf
@@ -171,7 +172,8 @@ class Core2Unit:
             self._announce()
         elif topic == 10:
             sec, nsec = struct.unpack("<II", payload)
-            self._clock_s, self._answered_s = sec + nsec * 1e-9 - now_s, now_s
+            # It adds all the time since it asked: a question that was heard late sets its clock ahead.
+            self._clock_s, self._answered_s = sec + nsec * 1e-9 - max(self._asked_s, 0.0), now_s
         elif topic == 11:
             self.configured = False
         elif topic == self.subscribed["cmd_vel"]:
@@ -240,7 +242,8 @@ class Core2Unit:
         if name == "pose":
             return header(stamp_s, "odom") + struct.pack("<3d", odom.x_m, odom.y_m, 0.0) + facing
         if name == "velocity":
-            east, north = odom.linear_m_s * math.cos(odom.yaw_rad), odom.linear_m_s * math.sin(odom.yaw_rad)
+            yaw_rad = odom.yaw_rad if self.kinematics == "DIFF" else 0.0  # in the odom frame, or in the body's
+            east, north = odom.linear_m_s * math.cos(yaw_rad), odom.linear_m_s * math.sin(yaw_rad)
             return struct.pack("<6d", east, north, 0.0, 0.0, 0.0, odom.angular_rad_s)
         if name == "imu":
             rates = struct.pack("<3d", 0.0, 0.0, odom.angular_rad_s)

@@ -1,69 +1,53 @@
-"""An RPLIDAR A2 as its line sees it: bytes in, bytes out, time handed in."""
+"""An RPLIDAR as its line sees it: bytes in, bytes out, time handed in.
+
+Source: Slamtec's interface protocol for the A series, and what its own client expects of a unit.
+"""
 
 import math
 import struct
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections import deque
 from functools import reduce
 from operator import xor
 
 import numpy as np
 
+from lira.sim_backend.emulators.rplidar_head import NO_SAMPLES, Distances, Head, Optics, Samples
+from lira.sim_backend.emulators.rplidar_models import EXPRESS_MODE, STANDARD_MODE, Model, ScanMode
+from lira.sim_backend.emulators.rplidar_streams import encode_dense, encode_express, encode_nodes, encode_ultra
 from lira.sim_backend.polyline import Floats
 
-MODEL_A2M8 = 0x28
 SERIAL = bytes(range(0xA0, 0xB0))
-BACKLOG_S = 0.2  # samples older than this never leave: the unit has no memory
-ACC_BOARD_TYPE = 0xFF
+BACKLOG_S = 0.05  # what the line cannot carry by then never leaves: the unit has little memory
+REQUEST_S = 5.0  # half a request is forgotten after so long
+BITS = 10  # of a byte on the line
+SLOWEST_HZ, FASTEST_HZ = 5, 15
+VENDORS_PWM = 600
+PROTECTED = 0x8008  # code of the error
 
-STOP, RESET, SCAN, EXPRESS = 0x25, 0x40, 0x20, 0x82
+STOP, RESET, SCAN, FORCE_SCAN, EXPRESS = 0x25, 0x40, 0x20, 0x21, 0x82
 INFO, HEALTH, SAMPLE_RATE, CONF, PWM, ACC_BOARD = 0x50, 0x52, 0x59, 0x84, 0xF0, 0xFF
-WITH_PAYLOAD = {EXPRESS, CONF, PWM, ACC_BOARD}
-
-Distances = Callable[[Floats], Floats]
-"""Distances in metres [n] at the unit's clockwise angles in radians [n]; 0 where nothing comes back."""
-
-
-@dataclass(frozen=True, slots=True)
-class ScanMode:
-    """An answer type, the points of one packet, and the time of a sample."""
-
-    answer: int
-    points: int
-    size: int
-    sample_s: float
-
-
-STANDARD_MODE = ScanMode(0x81, 1, 5, 500e-6)
-EXPRESS_MODE = ScanMode(0x82, 32, 84, 250e-6)
-DENSE_MODE = ScanMode(0x85, 40, 84, 62.5e-6)
-
-
-@dataclass(frozen=True, slots=True)
-class Model:
-    """What a unit is and can. `modes` is its table of scan modes; firmware before 1.24 does not tell it."""
-
-    firmware: tuple[int, int] = (1, 29)
-    modes: tuple[ScanMode, ...] = (STANDARD_MODE, EXPRESS_MODE)
-    baud: int = 115200
-    rate_hz: float = 10.0
-    broken: bool = False  # reports an error, even after a reset
+WITH_PAYLOAD = {EXPRESS, 0x83, CONF, 0x85, 0x90, 0xA8, PWM, ACC_BOARD}
 
 
 class RplidarUnit:
-    """The unit. `receive` takes what the host sent, `emit` gives what is due."""
+    """The unit. `receive` takes what the host sent, `emit` gives what has come over the line by now."""
 
     def __init__(self, distances: Distances, model: Model | None = None) -> None:
-        self._distances = distances
         self.model = model or Model()
         self.baud = self.model.baud
+        self.head = Head(self.model)
+        self._optics = Optics(self.model, distances)
         self.pwm = 0
         self.failed = self.model.broken  # a health error; a reset mends it if the unit is not broken
         self.mode: ScanMode | None = None
-        self._request = b""
-        self._answers = b""
-        self._began_s = 0.0
-        self._sent = 0
+        self._forced, self._started_s = False, -math.inf
+        self._request, self._requested_s = b"", -math.inf
+        self._boots_until_s = -math.inf
+        self._queue: deque[tuple[float, bytes, int]] = deque()  # when it goes on the line; samples up to its end
+        self._line_free_s = -math.inf
+        self._began_s: float | None = None
+        self._taken = self._sent = self._arrived = 0  # samples: measured, put on the line, at its end
+        self._forget_samples()
 
     @property
     def scanning(self) -> bool:
@@ -72,12 +56,21 @@ class RplidarUnit:
 
     @property
     def progress(self) -> tuple[float, int]:
-        """When the stream began, and how many of its samples were sent (or never will be)."""
-        return self._began_s, self._sent
+        """When the first sample of the stream was taken, and how many have come over the line (or never will)."""
+        return self._began_s or 0.0, self._arrived
+
+    def begin(self, mode: ScanMode, pwm: int, now_s: float) -> None:
+        """Scan as if it had been told to, without an answer."""
+        self._turn(pwm, now_s)
+        self._start(mode, now_s)
 
     def receive(self, data: bytes, now_s: float) -> None:
         """Obey whatever complete requests have come."""
-        self._request += data
+        if now_s < self._boots_until_s:
+            return
+        if now_s - self._requested_s > REQUEST_S:
+            self._request = b""
+        self._request, self._requested_s = self._request + data, now_s
         while (at := self._request.find(b"\xa5")) >= 0:
             self._request = self._request[at:]
             size = self._request_size()
@@ -89,9 +82,21 @@ class RplidarUnit:
         self._request = b""
 
     def emit(self, now_s: float) -> bytes:
-        """Return the answers, and the samples that were taken since the last time."""
-        answers, self._answers = self._answers, b""
-        return answers + self._stream(now_s)
+        """Return what has come over the line since the last time."""
+        self._scan(now_s)
+        came = b""
+        while self._queue:
+            start_s, data, samples = self._queue[0]
+            count = int((now_s - start_s) * self.baud / BITS + 1e-6)
+            if count <= 0:
+                break
+            came += data[:count]
+            if count < len(data):
+                self._queue[0] = start_s + count * BITS / self.baud, data[count:], samples
+                break
+            self._queue.popleft()
+            self._arrived = samples
+        return came
 
     def _request_size(self) -> int | None:
         if len(self._request) < 2:
@@ -101,118 +106,135 @@ class RplidarUnit:
         return self._request[2] + 4 if len(self._request) > 2 else None
 
     def _obey(self, request: int, payload: bytes, now_s: float) -> None:
-        if request == STOP:
+        """Any request ends the scan, and is answered; the motor's is for the board beside the unit."""
+        if request != PWM or self.model.pwm_ends_scan:
             self.mode = None
+        if request == PWM:
+            self._turn(struct.unpack("<H", payload)[0], now_s)
         elif request == RESET:
-            self.mode, self.failed = None, self.model.broken
-            self._answers += b"RP LIDAR System.\r\nFirmware Ver 1.29\r\n"
-        elif request == PWM:
-            self.pwm = struct.unpack("<H", payload)[0]
-        elif request in (SCAN, EXPRESS):
-            self._begin(STANDARD_MODE if request == SCAN else self._express(payload[0]), now_s)
-        elif self.mode is None:  # a scanning unit answers no questions
-            self._answer(request, payload)
+            self.failed = self.model.broken
+            self._boots_until_s = now_s + self.model.reset_s
+            self._queue.clear()
+            self._line_free_s = self._boots_until_s
+            self._send(b"RP LIDAR System.\r\nFirmware Ver %d.%02d\r\n" % self.model.firmware, now_s)
+        elif request in (SCAN, FORCE_SCAN, EXPRESS):
+            mode = self._express(payload[0]) if request == EXPRESS else self._mode_of(STANDARD_MODE.answer)
+            if mode is not None and not self.failed:
+                self._send(descriptor(mode.size, mode.answer, stream=True), now_s)
+                self._start(mode, now_s, forced=request == FORCE_SCAN)
+        elif request != STOP:
+            self._send(self._answer(request, payload), now_s)
+
+    def _turn(self, pwm: int, now_s: float) -> None:
+        self.pwm = pwm
+        self.head.tell(pwm, now_s)
 
     def _express(self, number: int) -> ScanMode | None:
-        if number == 0:
-            return EXPRESS_MODE if EXPRESS_MODE in self.model.modes else None
-        return self.model.modes[number] if number < len(self.model.modes) else None
+        modes = self.model.modes
+        if number == 0 or self.model.firmware < (1, 24):  # as old clients ask for it
+            return self._mode_of(EXPRESS_MODE.answer)
+        return modes[number] if number < len(modes) else None
 
-    def _begin(self, mode: ScanMode | None, now_s: float) -> None:
-        if mode is None or self.failed:
-            return
-        self.mode, self._began_s, self._sent = mode, now_s, 0
-        self._answers += descriptor(mode.size, mode.answer, stream=True)
+    def _mode_of(self, answer: int) -> ScanMode | None:
+        return next((mode for mode in self.model.modes if mode.answer == answer), None)
 
-    def _answer(self, request: int, payload: bytes) -> None:
+    def _start(self, mode: ScanMode, now_s: float, *, forced: bool = False) -> None:
+        self.mode, self._forced, self._started_s, self._began_s = mode, forced, now_s, None
+        self._forget_samples()
+
+    def _forget_samples(self) -> None:
+        self._taken = self._sent = self._arrived = 0
+        self._queue = deque((at_s, data, 0) for at_s, data, _ in self._queue)  # of a scan before
+        self._pending = NO_SAMPLES
+        self._before_rad = -math.inf  # of the head, when it took the sample before
+
+    def _answer(self, request: int, payload: bytes) -> bytes:
         major, minor = self.model.firmware
         if request == INFO:
-            self._answers += descriptor(20, 0x04) + bytes([MODEL_A2M8, minor, major, 5]) + SERIAL
-        elif request == HEALTH:
-            self._answers += descriptor(3, 0x06) + (b"\x02\x08\x80" if self.failed else b"\x00\x00\x00")
-        elif request == SAMPLE_RATE:
-            rates_us = [round(mode.sample_s * 1e6) for mode in (STANDARD_MODE, EXPRESS_MODE)]
-            self._answers += descriptor(4, 0x15) + struct.pack("<HH", *rates_us)
-        elif request == CONF and self.model.firmware >= (1, 24):
-            self._answers += self._configuration(payload)
-        elif request == ACC_BOARD:
-            self._answers += descriptor(4, ACC_BOARD_TYPE) + b"\x01\x00\x00\x00"
+            who = bytes([self.model.number, minor, major, self.model.hardware])
+            return descriptor(20, 0x04) + who + SERIAL
+        if request == HEALTH:
+            status, code = (2, PROTECTED) if self.failed else (1 if self.model.warning else 0, self.model.warning)
+            return descriptor(3, 0x06) + struct.pack("<BH", status, code)
+        if request == SAMPLE_RATE:
+            modes = self._mode_of(STANDARD_MODE.answer), self._mode_of(EXPRESS_MODE.answer)
+            rates_us = [0 if mode is None else round(mode.sample_s * 1e6) for mode in modes]
+            return descriptor(4, 0x15) + struct.pack("<HH", *rates_us)
+        if request == CONF and self.model.firmware >= (1, 24) and len(payload) >= 4:
+            entry = struct.unpack_from("<I", payload)[0]
+            number = struct.unpack_from("<H", payload, 4)[0] if len(payload) >= 6 else 0
+            value = self._configuration(entry, number)
+            return descriptor(4 + len(value), 0x20) + struct.pack("<I", entry) + value
+        if request == ACC_BOARD and self.model.has_pwm:
+            return descriptor(4, ACC_BOARD) + struct.pack("<I", 1)
+        return b""
 
-    def _configuration(self, payload: bytes) -> bytes:
-        entry = struct.unpack_from("<I", payload)[0]
-        modes, number = self.model.modes, struct.unpack_from("<H", payload, 4)[0] if len(payload) >= 6 else 0
-        value = b""
-        if entry == 0x70:
-            value = struct.pack("<H", len(modes))
-        elif entry == 0x7C:
-            value = struct.pack("<H", len(modes) - 1)
-        elif entry == 0x71 and number < len(modes):
-            value = struct.pack("<I", round(modes[number].sample_s * 256e6))
-        elif entry == 0x75 and number < len(modes):
-            value = bytes([modes[number].answer])
-        return descriptor(4 + len(value), 0x20) + struct.pack("<I", entry) + value
+    def _configuration(self, entry: int, number: int) -> bytes:
+        """An entry of the unit's table; nothing for one that it does not have."""
+        modes = self.model.modes
+        of_all = {
+            0x01: struct.pack("<HH", 600, VENDORS_PWM),  # the speed that it wants: per minute, and the duty for it
+            0x04: struct.pack("<H", 60 * SLOWEST_HZ),
+            0x05: struct.pack("<H", 60 * FASTEST_HZ),
+            0x60: struct.pack("<I", round(modes[0].reach_m * 256)),
+            0x70: struct.pack("<H", len(modes)),
+            0x7C: struct.pack("<H", self.model.typical),
+        }
+        if entry in of_all or number >= len(modes):
+            return of_all.get(entry, b"")
+        mode = modes[number]
+        of_mode = {
+            0x71: struct.pack("<I", round(mode.sample_s * 256e6)),
+            0x74: struct.pack("<I", round(mode.reach_m * 256)),
+            0x75: bytes([mode.answer]),
+            0x7F: mode.name.encode() + b"\0",
+        }
+        return of_mode.get(entry, b"")
 
-    def _stream(self, now_s: float) -> bytes:
+    def _scan(self, now_s: float) -> None:
+        """Take the samples that are due, and put the packets that they complete on the line."""
         mode = self.mode
-        if mode is None or self.pwm == 0:  # the laser is off while the head stands
-            return b""
+        if mode is None or not (self._forced or self.head.moving):  # the laser is off while the head stands
+            return
+        if self._began_s is None:
+            begins_s = self._started_s if self._forced else max(self._started_s, self.head.steady_s)
+            if now_s < begins_s:
+                return
+            self._began_s = begins_s
+        beyond = 1 if mode.answer == 0x84 else 0  # such a packet has to know the next one's first distance
         taken = int((now_s - self._began_s) / mode.sample_s)
-        forgotten = taken - self._sent - int(BACKLOG_S / mode.sample_s)
-        if forgotten > 0:
-            self._sent += forgotten // mode.points * mode.points
-        packets = (taken - self._sent) // mode.points
-        if packets <= 0:
-            return b""
-        first = self._sent == 0
-        number = self._sent + np.arange(packets * mode.points)
-        self._sent += len(number)
-        turns = np.asarray((self._began_s + number * mode.sample_s) * self.model.rate_hz, np.float64)
-        theta_rad: Floats = turns % 1.0 * math.tau
-        distance_m = self._distances(theta_rad)
+        if taken < self._sent + mode.points + beyond:
+            return
+        at_s: Floats = self._began_s + np.arange(self._taken, taken, dtype=np.float64) * mode.sample_s
+        self._taken = taken
+        theta_rad = self.head.turns(at_s) % 1.0 * math.tau
+        self._pending = self._pending.then(self._optics.look(theta_rad, corrected=mode.answer != 0x85))
+        while len(self._pending.theta_rad) >= mode.points + beyond:
+            packet = self._packet(mode, self._pending.part(0, mode.points + beyond))
+            self._pending = self._pending.part(mode.points)
+            self._sent += mode.points
+            self._send(packet, self._began_s + self._sent * mode.sample_s)
+
+    def _packet(self, mode: ScanMode, samples: Samples) -> bytes:
+        theta_rad, distance_m = samples.theta_rad, samples.distance_m
         if mode.answer == 0x81:
-            return encode_nodes(theta_rad, distance_m)
-        encode = encode_express if mode.answer == 0x82 else encode_dense
-        return encode(theta_rad[:: mode.points], distance_m.reshape(packets, mode.points), first)
+            starts = np.diff(theta_rad, prepend=self._before_rad) < -math.pi
+            self._before_rad = float(theta_rad[-1])
+            return encode_nodes((theta_rad - samples.behind_rad) % math.tau, distance_m, starts)
+        first = self._sent == 0
+        if mode.answer == 0x82:
+            return encode_express(theta_rad[:1], distance_m[None], first, samples.behind_rad[None])
+        encode = encode_ultra if mode.answer == 0x84 else encode_dense
+        return encode(theta_rad[:1], distance_m[None], first)
+
+    def _send(self, data: bytes, ready_s: float) -> None:
+        """Put bytes on the line once it is free; a packet that would come too late is dropped."""
+        start_s = max(ready_s, self._line_free_s)
+        if data and (self.mode is None or start_s - ready_s <= BACKLOG_S):
+            self._queue.append((start_s, data, self._sent))
+            self._line_free_s = start_s + len(data) * BITS / self.baud
 
 
 def descriptor(size: int, kind: int, *, stream: bool = False) -> bytes:
     """Head of an answer."""
     return b"\xa5\x5a" + struct.pack("<IB", size | (0x40000000 if stream else 0), kind)
-
-
-def encode_nodes(theta_rad: Floats, distance_m: Floats) -> bytes:
-    """Standard nodes; the first beyond the unit's front carries S."""
-    nodes = bytearray()
-    before = math.inf
-    for theta, distance in zip(theta_rad.tolist(), distance_m.tolist(), strict=True):
-        angle = round(math.degrees(theta) * 64) % 23040
-        start = theta < before - math.pi
-        quality = 15 if distance > 0 else 0
-        nodes += struct.pack("<BHH", quality << 2 | (1 if start else 2), angle << 1 | 1, round(distance * 4000))
-        before = theta
-    return bytes(nodes)
-
-
-def encode_express(start_rad: Floats, distance_m: Floats, first: bool = False) -> bytes:
-    """Express capsules from start angles [n] and distances [n, 32]."""
-    stream = b""
-    for number, (start, distances) in enumerate(zip(start_rad, distance_m, strict=True)):
-        words = [round(float(distance) * 1000) << 2 for distance in distances]
-        cabins = b"".join(struct.pack("<HHB", words[i], words[i + 1], 0) for i in range(0, len(words), 2))
-        stream += seal(float(start), cabins, begins=first and number == 0)
-    return stream
-
-
-def encode_dense(start_rad: Floats, distance_m: Floats, first: bool = False) -> bytes:
-    """Dense capsules from start angles [n] and distances [n, 40]."""
-    bodies = np.rint(distance_m * 1000).astype("<u2")
-    pairs = enumerate(zip(start_rad, bodies, strict=True))
-    return b"".join(seal(float(start), body.tobytes(), begins=first and number == 0) for number, (start, body) in pairs)
-
-
-def seal(start_rad: float, body: bytes, *, begins: bool = False) -> bytes:
-    """Put the head on a capsule: check nibbles with the sum, start angle, S."""
-    angle = round(math.degrees(start_rad) * 64) % 23040 | (0x8000 if begins else 0)
-    checked = struct.pack("<H", angle) + body
-    total = reduce(xor, checked)
-    return bytes([0xA0 | total & 0x0F, 0x50 | total >> 4]) + checked

@@ -14,7 +14,9 @@ from lira.hal.messages import Command, CompressedImage, CourseState, Episode, Im
 from lira.hal.profile import RobotProfile
 from lira.sim_backend.emulators.camera import MjpegServer
 from lira.sim_backend.emulators.core2 import Core2Unit, Firmware
-from lira.sim_backend.emulators.rplidar import Model, RplidarUnit
+from lira.sim_backend.emulators.regulators import PERIOD_S, Regulators
+from lira.sim_backend.emulators.rplidar import RplidarUnit
+from lira.sim_backend.emulators.rplidar_models import Model
 from lira.sim_backend.emulators.wire import Wire
 from lira.sim_backend.polyline import Floats
 from lira.sim_backend.twin import Twin
@@ -51,7 +53,8 @@ class WiredTwin:
         self._ready.wait(OPEN_S)
         self._raise_failure()
         self.lidar = RplidarUnit(self._distances, lidar_model)
-        self.base = Core2Unit(self._drive, lambda: self._odom, firmware)
+        self._regulators = Regulators(twin.profile.base)
+        self.base = Core2Unit(self._drive, self._measure, firmware)
         self._wires: list[Wire] = []
         try:
             self._wires.append(Wire(folder / "rplidar", self.lidar))
@@ -112,7 +115,12 @@ class WiredTwin:
         self._scan = seen.scan
         self._odom = seen.odom or self._odom
 
+    def _measure(self) -> Odometry:
+        return self._regulators.reckon(self._odom)
+
     def _drive(self, twist: Twist) -> None:
+        if self.twin.profile.base.drive == "wheels":
+            twist = self._regulators.drive(twist, time.monotonic())
         self.twin.drive(Command(twist, self.twin.now()))
 
     def _distances(self, theta_rad: Floats) -> Floats:
@@ -136,8 +144,18 @@ class WiredTwin:
 
 
 def sweeping(profile: RobotProfile) -> RobotProfile:
-    """Return the profile for a twin behind wires: a head that turns sees now what the twin takes in whole turns."""
-    return replace(profile, lidar=replace(profile.lidar, rate_hz=1.0 / LOOK_S))
+    """Return the profile for a twin behind wires.
+
+    A head that turns sees now what the twin takes in whole turns, and its unit has blanks of its own. And wheels that
+    swing about the fastest speed are now and then faster; who limits it is the robot's side.
+    """
+    base, swing_m_s = profile.base, 2 * profile.base.acceleration_m_s2 * PERIOD_S
+    base = replace(
+        base,
+        max_linear_m_s=base.max_linear_m_s + swing_m_s,
+        max_angular_rad_s=base.max_angular_rad_s + 2 * swing_m_s / base.track_m,
+    )
+    return replace(profile, base=base, lidar=replace(profile.lidar, rate_hz=1.0 / LOOK_S, dropout=0.0))
 
 
 def jpeg_of(image: Image | CompressedImage) -> bytes:

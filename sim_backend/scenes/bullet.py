@@ -31,8 +31,9 @@ from lira.sim_backend.scenes.base import (
     backdrop,
     floor_distances_m,
 )
-from lira.sim_backend.scenes.meshes import Mesh, box_mesh, join, obj_text, paint
+from lira.sim_backend.scenes.shapes import Faces, box_mesh, join, obj_text, paint
 from lira.sim_backend.scenes.silence import quiet
+from lira.sim_backend.world import Mesh
 
 T = TypeVar("T")
 
@@ -144,13 +145,15 @@ class BulletScene:
         bullet.resetSimulation(physicsClientId=self.client)
         # Or pybullet keeps every mesh file it has ever read.
         bullet.setPhysicsEngineParameter(enableFileCaching=0, physicsClientId=self.client)
-        for gray, mesh in paint(layout):
-            self._draw(mesh, gray)
+        for gray, faces in paint(layout):
+            self._draw(faces, gray)
         for gray in sorted({block.gray for block in layout.blocks}):
             alike = [block for block in layout.blocks if block.gray == gray]
             for first in range(0, len(alike), GROUP):
                 group = alike[first : first + GROUP]
                 self._draw(join([box_mesh(block) for block in group]), gray, self._solid(group))
+        for mesh in layout.world.mesh:
+            self._furnish(mesh)
         bullet.performCollisionDetection(physicsClientId=self.client)
 
     def _load_egl(self) -> bool:
@@ -174,21 +177,54 @@ class BulletScene:
         )
         return shape
 
-    def _draw(self, mesh: Mesh, gray: int, solid: int = -1) -> None:
+    def _furnish(self, mesh: Mesh) -> None:
+        """Put a thing from a file onto the floor. Raises `ConfigError` if pybullet cannot read it."""
+        bullet, yaw_rad = self.bullet, math.radians(mesh.yaw_deg)
+        place = {
+            "basePosition": [mesh.x_m, mesh.y_m, mesh.z_m],
+            "baseOrientation": [0.0, 0.0, math.sin(yaw_rad / 2), math.cos(yaw_rad / 2)],
+            "physicsClientId": self.client,
+        }
+        try:
+            with quiet():
+                if mesh.path.endswith(".urdf"):
+                    body = bullet.loadURDF(mesh.path, useFixedBase=True, globalScaling=mesh.scale, **place)
+                else:
+                    body = bullet.createMultiBody(0, *self._shapes(mesh), **place)
+        except bullet.error as error:
+            raise ConfigError(
+                f"pybullet cannot read {mesh.path}: {error}", "Mend the file, or leave it out."
+            ) from error
+        for part in bullet.getVisualShapeData(body, physicsClientId=self.client):
+            colour = [*[shade(mesh.gray)] * 3, 1.0]
+            bullet.changeVisualShape(body, part[1], rgbaColor=colour, physicsClientId=self.client)
+
+    def _shapes(self, mesh: Mesh) -> tuple[int, int]:
+        """What rays meet of a mesh's file, triangle by triangle, and what is seen of it."""
+        bullet = self.bullet
+        how = {"fileName": mesh.path, "meshScale": [mesh.scale] * 3, "physicsClientId": self.client}
+        solid = bullet.createCollisionShape(bullet.GEOM_MESH, flags=bullet.GEOM_FORCE_CONCAVE_TRIMESH, **how)
+        return solid, bullet.createVisualShape(bullet.GEOM_MESH, **how)
+
+    def _draw(self, faces: Faces, gray: int, solid: int = -1) -> None:
         """Add a body; without a solid it is a picture only."""
-        # A little above the gray asked for: the renderers cut off where they should round.
-        shade = min((gray + 0.25) / 255, 1.0)
+        level = shade(gray)
         with tempfile.TemporaryDirectory() as folder:
             # A file, because the OpenGL plugin crashes on a mesh handed over in memory.
             path = Path(folder) / "mesh.obj"
-            path.write_text(obj_text(mesh), encoding="ascii")
+            path.write_text(obj_text(faces), encoding="ascii")
             visual = self.bullet.createVisualShape(
                 self.bullet.GEOM_MESH,
                 fileName=str(path),
-                rgbaColor=[shade, shade, shade, 1.0],
+                rgbaColor=[level, level, level, 1.0],
                 physicsClientId=self.client,
             )
             self.bullet.createMultiBody(0, solid, visual, physicsClientId=self.client)
+
+
+def shade(gray: int) -> float:
+    """A gray as a share: a little above the one asked for, as the renderers cut off where they should round."""
+    return min((gray + 0.25) / 255, 1.0)
 
 
 def axis_distance_m(buffer: FloatArray) -> Floats:

@@ -6,7 +6,7 @@ from numpy.typing import NDArray
 from lira.sim_backend.layout import Layout
 from lira.sim_backend.polyline import Floats
 from lira.sim_backend.scenes.base import FAR_M, NEAR_M, Pose, View
-from lira.sim_backend.scenes.meshes import Indices, box_mesh, paint, straighten
+from lira.sim_backend.scenes.shapes import Indices, box_mesh, paint, straighten
 
 Flags = NDArray[np.bool_]
 

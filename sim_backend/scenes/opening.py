@@ -11,23 +11,36 @@ from lira.sim_backend.scenes.base import Pose, Scene
 from lira.sim_backend.scenes.bullet import BulletScene, import_pybullet
 from lira.sim_backend.scenes.silence import quiet
 from lira.sim_backend.scenes.sketch import SketchScene
+from lira.sim_backend.world import World
 
 TRIAL_FRAMES = 3
 
 Renderer = Literal["auto", "sketch", "tiny", "egl"]
 
 
-def settle(renderer: Renderer) -> Renderer:
-    """Say what "auto" means where pybullet is missing: the sketch. Raises `ConfigError` if it is asked for."""
-    if renderer == "sketch":
-        return renderer
-    try:
-        import_pybullet()
-    except ConfigError:
-        if renderer != "auto":
-            raise
-        return "sketch"
+def settle(renderer: Renderer, world: World) -> Renderer:
+    """Say what "auto" means where pybullet is missing: the sketch.
+
+    Raises `ConfigError` where pybullet is asked for and missing, and where a sketch would leave something out.
+    """
+    if renderer == "sketch" and world.mesh:
+        raise ConfigError(
+            f"world '{world.name}' has meshes, which a sketch cannot draw",
+            "Use the renderer 'tiny', which is pybullet's, or make them of boxes.",
+        )
+    if renderer != "sketch":
+        try:
+            import_pybullet()
+        except ConfigError:
+            if renderer != "auto" or world.mesh:
+                raise
+            return "sketch"
     return renderer
+
+
+def quickest(world: World) -> Renderer:
+    """The sketch, if it can draw all there is."""
+    return "auto" if world.mesh else "sketch"
 
 
 def open_scene(camera: Camera, layout: Layout, renderer: Renderer) -> Scene:
@@ -35,7 +48,7 @@ def open_scene(camera: Camera, layout: Layout, renderer: Renderer) -> Scene:
 
     Raises `ConfigError` if pybullet or EGL is asked for and this machine has none.
     """
-    renderer = settle(renderer)
+    renderer = settle(renderer, layout.world)
     if renderer == "sketch":
         return SketchScene(layout)
     if renderer == "tiny" or (renderer == "auto" and is_small(camera)):

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from lira.sim_backend.layout import Block
 from lira.sim_backend.polyline import Floats
-from lira.sim_backend.scenes.meshes import Indices, box_mesh
+from lira.sim_backend.scenes.shapes import Indices, box_mesh
 
 Flags = NDArray[np.bool_]
 

@@ -9,9 +9,9 @@ from lira.sim_backend.layout import Layout
 from lira.sim_backend.polyline import Floats
 from lira.sim_backend.scenes.base import Drawer, Pixels, Pose, View, backdrop, floor_distances_m
 from lira.sim_backend.scenes.facets import Facets, project
-from lira.sim_backend.scenes.meshes import Indices
 from lira.sim_backend.scenes.prisms import Flags, Prisms
 from lira.sim_backend.scenes.scanline import cover
+from lira.sim_backend.scenes.shapes import Indices
 
 BOX_FACES = 6
 

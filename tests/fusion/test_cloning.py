@@ -1,7 +1,7 @@
 from taught import FEATURES, make_novice
 
-from lira.fusion.methods.base import Call
 from lira.fusion.methods.rivals.cloning import Cloning
+from lira.hal.messages import Call
 
 FAR = (-1.0, 1.0)
 
@@ -12,7 +12,7 @@ def test_the_human_always_drives_and_training_waits_for_the_end_of_the_lap():
     for now_s in range(10):
         method.update(now_s)
         proposal = method.propose(FEATURES)
-        assert (proposal.choice.driver, proposal.choice.call) == ("human", Call.FEEDBACK)
+        assert (proposal.choice.driver, proposal.choice.call) == ("none", Call.FEEDBACK)
         assert method.learn(proposal, FAR if now_s % 2 else proposal.novice).stored  # known or not
     assert (trainer.started, novice.trained) == (0, False)
     method.reset()

@@ -125,7 +125,7 @@ def test_what_was_applied_is_learned_not_what_was_wished_for(loop):
     assert method.lessons == [(1.0, -1.0)]
 
 
-@pytest.mark.parametrize(("driver", "shown"), [("novice", True), ("camera", True), ("human", False)])
+@pytest.mark.parametrize(("driver", "shown"), [("novice", True), ("camera", True), ("none", False)])
 def test_the_teacher_looks_ahead_with_whoever_drives(loop, driver, shown):
     method, hand = Driver(driver=driver), Hand(None)
     loop.step(method, hand)

@@ -10,13 +10,14 @@ from taught import FEATURES, make_novice
 
 from lira.fusion.inference.build import alone
 from lira.fusion.learning.learner import Label, Learner
-from lira.fusion.methods.base import STAND, Call
+from lira.fusion.methods.base import STAND
 from lira.fusion.methods.doubt import DoubtLog, doubt, threshold
 from lira.fusion.methods.rivals.hg_dagger import HgDagger
 from lira.fusion.methods.stop_and_ask import Doubtful
 from lira.fusion.policies.ensemble import EnsembleNet
 from lira.fusion.policies.networks import FusionNet
 from lira.fusion.preprocess import Features
+from lira.hal.messages import Call
 
 
 def opinions(spread):

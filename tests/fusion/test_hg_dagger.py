@@ -3,9 +3,10 @@ import pytest
 from nets import camera_net
 
 from lira.fusion.learning.novice import LearningSettings, NetworkNovice
-from lira.fusion.methods.base import STAND, Call
+from lira.fusion.methods.base import STAND
 from lira.fusion.methods.rivals.hg_dagger import HgDagger
 from lira.fusion.preprocess import Features
+from lira.hal.messages import Call
 
 FEATURES = Features(scan=np.zeros(101, np.float32), image=np.zeros((32, 32), np.float32))
 FAR = (-1.0, 1.0)  # from anything a fresh network does
@@ -47,7 +48,7 @@ def train(method):
 
 def test_before_the_first_training_step_it_stands_and_asks_the_human_to_drive(method):
     choice = method.propose(FEATURES).choice
-    assert (choice.driver, choice.action, choice.label, choice.call) == ("human", STAND, None, Call.FEEDBACK)
+    assert (choice.driver, choice.action, choice.label, choice.call) == ("none", STAND, None, Call.FEEDBACK)
 
 
 def test_afterwards_the_novice_drives_and_nobody_is_called(method):

@@ -5,9 +5,9 @@ import pytest
 
 from lira.fusion.control import Step
 from lira.fusion.log.recorder import Journal
-from lira.fusion.methods.base import Call, Choice, Lesson, Proposal
+from lira.fusion.methods.base import Choice, Lesson, Proposal
 from lira.fusion.preprocess import Features
-from lira.hal.messages import STOP, Applied, CourseState, ExpertView, LabelCounts, Observation
+from lira.hal.messages import STOP, Applied, Call, CourseState, ExpertView, LabelCounts, Observation
 
 IMAGE = (np.arange(32 * 32).reshape(32, 32) % 256 / 255).astype(np.float32)
 FEATURES = Features(scan=np.linspace(0, 1, 101, dtype=np.float32), image=IMAGE)

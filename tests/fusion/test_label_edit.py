@@ -192,3 +192,12 @@ class TestMerge:
 def test_the_records_themselves_can_be_read(log):
     correct(log, [0], stored=False)
     assert [each.correction for each in read_records(log)] == [False] * 6 + [True]
+
+
+def test_what_is_no_file_is_refused_at_once(tmp_path):
+    os.mkfifo(tmp_path / "pipe")
+    for path in (tmp_path / "pipe", tmp_path, tmp_path / "none"):
+        with pytest.raises(StorageError):
+            correct(path, [0], stored=False)
+        with pytest.raises(StorageError):
+            merge(path, path, tmp_path / "c")

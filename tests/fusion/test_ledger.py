@@ -5,7 +5,8 @@ from dataclasses import replace
 import pytest
 
 from lira.fusion.log.counts import Account, Ledger
-from lira.fusion.methods.base import Call, Choice, Lesson, Proposal, Settled
+from lira.fusion.methods.base import Choice, Lesson, Proposal, Settled
+from lira.hal.messages import Call
 
 PERIOD_S = 0.2
 SCRIPT = {

@@ -7,10 +7,10 @@ import pytest
 
 from lira.fusion.learning.novice import LearningSettings, NetworkNovice, is_redundant
 from lira.fusion.log.counts import Ledger
-from lira.fusion.methods.base import Call, Expert
+from lira.fusion.methods.base import Expert
 from lira.fusion.methods.lira import PRESETS, LiraSettings, LiraSpf, activation, choose, in_consensus
 from lira.fusion.preprocess import Features
-from lira.hal.messages import ExpertView
+from lira.hal.messages import Call, ExpertView
 
 T = 0.20
 NOVICE = (0.9, -0.3)
@@ -65,11 +65,20 @@ def test_with_three_experts_every_active_pair_has_to_agree():
     third = expert("sonar", (1.0, 0.35), active=True)
     near = [camera(active=True), lidar(active=True, action=(1.0, 0.45)), third]
     far = [camera(active=True), lidar(active=True, action=(1.0, 0.6)), third]
-    assert choose(None, near, NOVICE, T).driver == "mean"
+    agreed = choose(None, near, NOVICE, T)
+    assert agreed.driver == "mean"
+    assert agreed.action == agreed.label == pytest.approx((1.0, (0.5 + 0.45 + 0.35) / 3))
     assert choose(None, far, NOVICE, T).call is Call.FEEDBACK
+    # neighbours agree, the outer two do not
+    chain = [camera(active=True), lidar(active=True, action=(1.0, 0.65)), expert("depth", (1.0, 0.8), active=True)]
+    assert choose(None, chain, NOVICE, T).call is Call.FEEDBACK
     # the one that disagrees is not active: it has no say
     quiet = [camera(active=True), lidar(active=False, action=(1.0, 0.9)), third]
-    assert choose(None, quiet, NOVICE, T).driver == "mean"
+    two = choose(None, quiet, NOVICE, T)
+    assert two.driver == "mean"
+    assert two.action == pytest.approx((1.0, (0.5 + 0.35) / 2))
+    alone = choose(None, [camera(active=False), lidar(active=False), third], NOVICE, T)
+    assert (alone.driver, alone.label, alone.call) == ("sonar", (1.0, 0.35), Call.ATTENTION)
 
 
 def test_consensus_is_strict():
@@ -195,7 +204,7 @@ def test_a_feedback_call_slows_both_components_and_learns_nothing():
 def test_before_the_first_training_step_the_human_is_asked_to_drive():
     lira = make_lira({"camera": STRAIGHT, "lidar": STRAIGHT}, PRESETS["hold"], trained=False)
     proposal = run(lira, 1)[0]
-    assert (proposal.choice.driver, proposal.command, proposal.choice.call) == ("human", (0.0, 0.0), Call.FEEDBACK)
+    assert (proposal.choice.driver, proposal.command, proposal.choice.call) == ("none", (0.0, 0.0), Call.FEEDBACK)
     lira = make_lira({"camera": STRAIGHT, "lidar": STRAIGHT}, LiraSettings(start="experts"), trained=False)
     proposal = run(lira, 1)[0]
     assert (proposal.choice.driver, proposal.choice.label) == ("mean", (1.0, 0.0))

@@ -6,10 +6,11 @@ from nets import fusion_net
 
 from lira.fusion.learning.novice import LearningSettings, NetworkNovice
 from lira.fusion.log.recorder import Journal
-from lira.fusion.methods.base import Alone, Call, Chooser, Expert
+from lira.fusion.methods.base import Alone, Chooser, Expert
 from lira.fusion.methods.lira import LiraSettings, LiraSpf
 from lira.fusion.methods.plus import LiraPlus, PlusSettings
 from lira.fusion.preprocess import Features
+from lira.hal.messages import Call
 
 PERIOD_S = 0.2
 BINS = 101

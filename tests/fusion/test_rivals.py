@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from taught import FEATURES, make_novice
 
-from lira.fusion.methods.base import STAND, Call
+from lira.fusion.methods.base import STAND
 from lira.fusion.methods.doubt import DoubtLog
 from lira.fusion.methods.rivals.ensemble_dagger import EnsembleDagger, EnsembleDaggerSettings
 from lira.fusion.methods.rivals.gated import RobotGated, discrepancy
@@ -15,6 +15,7 @@ from lira.fusion.methods.rivals.lazy_dagger import LazyDagger, LazyDaggerSetting
 from lira.fusion.methods.rivals.probe import START, Probe
 from lira.fusion.methods.rivals.thrifty_dagger import ThriftyDagger, ThriftyDaggerSettings
 from lira.fusion.preprocess import Features
+from lira.hal.messages import Call
 
 NOVICE = (0.9, -0.3)
 FAR = (1.0, 1.0)
@@ -45,7 +46,7 @@ def test_before_it_has_learned_anything_the_person_drives_and_no_rule_is_asked()
     method = Switch(novice)
     method.over = True
     proposal = method.propose(FEATURES)
-    assert (proposal.choice.driver, proposal.command, proposal.choice.call) == ("human", STAND, Call.FEEDBACK)
+    assert (proposal.choice.driver, proposal.command, proposal.choice.call) == ("none", STAND, Call.FEEDBACK)
 
 
 def test_it_stands_and_calls_until_the_person_is_needed_no_longer():

@@ -8,10 +8,10 @@ import pytest
 from lira.fusion.control import ControlLoop
 from lira.fusion.log.recorder import Journal
 from lira.fusion.log.run_log import LapRecord
-from lira.fusion.methods.base import Call, Choice, Lesson, Proposal
+from lira.fusion.methods.base import Choice, Lesson, Proposal
 from lira.fusion.teaching.session import LOST_OBSERVATIONS, PUT_BACK_M, PUT_ON_M, Drive, Same, Session
 from lira.hal.errors import DeviceError
-from lira.hal.messages import Episode
+from lira.hal.messages import Call, Episode
 from lira.hal.profile import load_profile
 from lira.hal.safety.governed import GovernedRobot
 from lira.hal.testing import NullRobot

@@ -5,9 +5,9 @@ import itertools
 import pytest
 from taught import FEATURES, make_novice, play
 
-from lira.fusion.methods.base import Call
 from lira.fusion.methods.lira import PRESETS, LiraSpf
 from lira.fusion.methods.shared_feedback import SharedFeedback, SharingSettings, similar_expert
+from lira.hal.messages import Call
 
 CAMERA, LIDAR, NOVICE = (1.0, 0.5), (1.0, -0.5), (0.9, 0.0)
 LIKE_LIDAR, UNLIKE = (1.0, -0.4), (0.0, -0.1)

@@ -7,11 +7,12 @@ import msgspec
 import numpy as np
 import pytest
 
-from lira.fusion.methods.base import STAND, Alone, Call, Method
-from lira.fusion.methods.shield import DRIVER, HORIZON_S, MARGINS_M, STEPS, Shield, Shielded, arcs
+from lira.fusion.methods.base import STAND, Alone, Method
+from lira.fusion.methods.shield import HORIZON_S, MARGINS_M, STEPS, Shield, Shielded, arcs
 from lira.fusion.methods.stop_and_ask import Doubtful
 from lira.fusion.preprocess import Features
 from lira.hal.errors import ConfigError
+from lira.hal.messages import Call
 from lira.hal.profile import load_profile
 
 SIM, REAL = load_profile("thesis-sim"), load_profile("rosbot2")
@@ -138,9 +139,9 @@ class TestShielded:
         method = Shielded(Alone("novice", lambda _: (1.0, 0.0)), Shield(SIM))
         free, box = method.propose(FREE), method.propose(BOX)
         assert (free.choice.driver, free.command) == ("novice", (1.0, 0.0))
-        assert (box.choice.driver, box.novice) == (DRIVER, (1.0, 0.0))
+        assert (box.choice.driver, box.novice) == ("shield", (1.0, 0.0))
         assert box.command[1] < 0.0
-        assert method.policy(DRIVER)(BOX) == method.policy("novice")(BOX) == box.command
+        assert method.policy("shield")(BOX) == method.policy("novice")(BOX) == box.command
         assert method.policy("novice")(FREE) == (1.0, 0.0)
 
     def test_where_no_turn_is_clear_it_stands_and_calls(self):

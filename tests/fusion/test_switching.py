@@ -1,9 +1,10 @@
 import numpy as np
 from taught import FEATURES
 
-from lira.fusion.methods.base import Call, Expert
+from lira.fusion.methods.base import Expert
 from lira.fusion.methods.rivals.switching import Switching, SwitchingSettings
 from lira.fusion.preprocess import Features
+from lira.hal.messages import Call
 
 CAMERA, LIDAR = (1.0, 0.1), (0.5, -0.8)
 

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from lira.fusion.control import to_twist
-from lira.fusion.methods.base import Call, Choice, Proposal
+from lira.fusion.methods.base import Choice, Proposal
 from lira.fusion.preprocess import Features
 from lira.fusion.teaching.teacher import PERFECT, SKILLED, ScriptedTeacher, TeacherSettings
-from lira.hal.messages import Command, CourseState, Episode
+from lira.hal.messages import Call, Command, CourseState, Episode
 from lira.hal.profile import load_profile
 from lira.sim_backend.foresight import Foresight
 from lira.sim_backend.twin import Twin
@@ -44,7 +44,7 @@ class Crystal:
     def set_layout(self, layout):
         self.layouts.append(layout)
 
-    def rollout(self, state, policy, steps, period_s):
+    def rollout(self, state, policy, steps, period_s, ends):
         self.rollouts += 1
         return [replace(state, x_m=state.x_m + 0.2, collided=self.danger)]
 

@@ -2,6 +2,7 @@
 
 import math
 import random
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -13,6 +14,8 @@ from lira.hal.messages import (
     Applied,
     Clock,
     CompressedImage,
+    Decision,
+    Driver,
     Image,
     Imu,
     LaserScan,
@@ -32,7 +35,7 @@ SCAN = of_kind(LaserScan)[0]
 def fields(message: object) -> list[object]:
     """Comparable values, so that nan equals nan and arrays compare."""
     values = [getattr(message, name) for name in type(message).__dataclass_fields__]
-    return [repr(v.tolist()) + str(v.shape) if isinstance(v, np.ndarray) else repr(v) for v in values]
+    return [repr(v.tolist()) + str(v.shape) if isinstance(v, np.ndarray) else str(v) for v in values]
 
 
 def independent(message: object) -> object:
@@ -51,6 +54,19 @@ def test_round_trip(message):
             for m in (back, message)
         )
     assert fields(back) == fields(message)
+
+
+@pytest.mark.parametrize(("field", "word"), [("phase", "holiday"), ("call", "shout")])
+def test_a_decision_in_a_phase_or_with_a_call_that_there_is_none_of_is_no_decision(field, word):
+    ros = CODECS[Decision].to_ros(DECISION)
+    setattr(ros, field, word)
+    with pytest.raises(CodecError, match=word):
+        decode(Decision, bytes(TYPES.serialize_cdr(ros, ros_type_of(Decision))))
+
+
+def test_on_the_wire_who_drove_is_a_word():
+    ros = CODECS[Decision].to_ros(replace(DECISION, driver=Driver.HUMAN))
+    assert (type(ros.driver), ros.driver) == (str, "human")
 
 
 def test_every_message_with_a_codec_is_tested():

@@ -7,7 +7,7 @@ from wiring import joined, new_endpoint, real_time_null, remote, served, wait_fo
 from lira.hal.bus.bus import Bus
 from lira.hal.bus.topics import CMD_VEL, DIAGNOSTICS
 from lira.hal.client.remote import RemoteRobot
-from lira.hal.messages import STOP, Command
+from lira.hal.messages import STOP, Command, DiagnosticStatus
 from lira.hal.port import DeviceHealth
 from lira.hal.profile import load_profile
 from lira.hal.safety.governed import FIELD_OFF
@@ -94,3 +94,18 @@ def test_that_the_field_is_off_without_a_lidar_is_said_once_and_on_diagnostics(c
         assert ("protective field", FIELD_OFF) in told.values
         assert ("device losses", "2") in told.values
     assert capfd.readouterr().err.count(FIELD_OFF) == 1
+
+
+class TellsOfItself(NullRobot):
+    def diagnostics(self):
+        return (DiagnosticStatus(1, "lidar", "the unit warns of 0x0042", (("rate Hz", "10.01"),)),)
+
+
+def test_what_a_robots_devices_say_of_themselves_is_published():
+    robot = TellsOfItself(load_profile("thesis-sim"), time.monotonic, time.sleep)
+    with served(robot) as there, joined(there) as peer:
+        reader = peer.reader(DIAGNOSTICS)
+        wait_for(lambda: status(reader, "lidar") is not None)
+        told = status(reader, "lidar")
+        assert told.name == f"{there.name}: lidar"
+        assert (told.level, told.message, told.values) == (1, "the unit warns of 0x0042", (("rate Hz", "10.01"),))

@@ -16,7 +16,7 @@ from lira.sim_backend.emulators.rosserial import encode, topic_info
 from lira.sim_backend.emulators.wire import Wire
 
 FAST = Firmware(boot_s=0.1)
-SETTINGS = BaseSettings(boot_s=0.15)
+SETTINGS = BaseSettings(boot_s=0.15, spin_slip_m_rad=0.0)
 
 
 class Bench:

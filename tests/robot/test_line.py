@@ -1,4 +1,7 @@
+import os
 import socket
+import subprocess
+import sys
 import threading
 import time
 from contextlib import contextmanager
@@ -60,6 +63,24 @@ def wait_for(condition, timeout_s=5.0):
     while not condition():
         assert time.monotonic() < until_s
         time.sleep(0.01)
+
+
+def test_a_port_that_another_program_reads_is_in_use(tmp_path):
+    ours, theirs = os.openpty()
+    path = os.ttyname(theirs)
+    reads = f"import os, time; os.open({path!r}, os.O_RDWR | os.O_NOCTTY); print('open', flush=True); time.sleep(60)"
+    child = subprocess.Popen([sys.executable, "-c", reads], stdout=subprocess.PIPE)
+    try:
+        assert child.stdout.readline() == b"open\n"
+        with pytest.raises(DeviceError, match=rf"in use by .*\({child.pid}\)"):
+            Line(path, 115200)
+    finally:
+        child.kill()
+        child.wait()
+        child.stdout.close()
+    Line(path, 115200).close()
+    os.close(ours)
+    os.close(theirs)
 
 
 def test_lidar_and_base_work_behind_serial_servers_and_come_back_after_a_hang_up():

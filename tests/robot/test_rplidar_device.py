@@ -17,15 +17,16 @@ from lira.robot.rplidar import protocol
 from lira.robot.rplidar.device import RPLidar
 from lira.robot.settings import LidarSettings
 from lira.robot.supervisor import Supervisor
-from lira.sim_backend.emulators.rplidar import (
+from lira.sim_backend.emulators.rplidar import RplidarUnit, descriptor
+from lira.sim_backend.emulators.rplidar_models import (
     DENSE_MODE,
     EXPRESS_MODE,
+    MODELS,
     STANDARD_MODE,
+    ULTRA_MODE,
     Model,
-    RplidarUnit,
-    descriptor,
-    seal,
 )
+from lira.sim_backend.emulators.rplidar_streams import seal
 from lira.sim_backend.emulators.wire import Wire
 
 LIDAR = load_profile("rosbot2").lidar
@@ -48,7 +49,7 @@ class Bench:
         self.wire = Wire(path, self.unit)
         self.scans = []
         self.driver = RPLidar(str(path), LIDAR, settings, self.scans.append)
-        self.supervisor = Supervisor("lidar", self.driver.session)
+        self.supervisor = Supervisor("lidar", self.driver.session, self.driver.rest)
 
     def __enter__(self):
         self.supervisor.start()
@@ -75,28 +76,31 @@ def around(scan, degrees, within=3):
     return np.nanmedian([at(scan, degrees + offset) for offset in range(-within, within + 1)])
 
 
-MODELS = {
+DENSE = replace(DENSE_MODE, sample_s=100e-6)
+UNITS = {
     "express, old firmware": (Model(firmware=(1, 20)), "EXPRESS"),
     "standard, oldest firmware": (Model(firmware=(1, 10), modes=(STANDARD_MODE,)), "STANDARD"),
     "express by table": (Model(), "EXPRESS"),
-    "dense": (Model(modes=(STANDARD_MODE, EXPRESS_MODE, DENSE_MODE)), "DENSE"),
+    "dense": (Model(baud=256000, modes=(STANDARD_MODE, EXPRESS_MODE, DENSE)), "DENSE"),
+    "ultra": (Model(modes=(STANDARD_MODE, EXPRESS_MODE, ULTRA_MODE)), "ULTRA"),
+    "ultra, fast": (Model(baud=256000, modes=(STANDARD_MODE, replace(ULTRA_MODE, sample_s=63e-6))), "ULTRA"),
     "standard only": (Model(modes=(STANDARD_MODE,)), "STANDARD"),
     "256000 baud": (Model(baud=256000), "EXPRESS"),
 }
 
 
-@pytest.mark.parametrize("name", MODELS)
+@pytest.mark.parametrize("name", UNITS)
 def test_it_scans_at_the_right_speed_in_the_best_mode(tmp_path, name):
-    model, mode = MODELS[name]
+    model, mode = UNITS[name]
     with Bench(tmp_path / "lidar", model) as bench:
-        scan = bench.wait_scans(2)
+        scan = bench.wait_scans(5)
         assert bench.driver.mode.answer.name == mode
         assert bench.driver.info.firmware == model.firmware
         assert around(scan, 0) == pytest.approx(1.0, abs=0.02)
         assert around(scan, 90) == pytest.approx(2.0, abs=0.03)
         assert around(scan, 40) == pytest.approx(1.0 / math.cos(math.radians(40)), abs=0.05)
         assert np.isnan([at(scan, degrees) for degrees in (180, -120, 140)]).all()
-        assert scan.scan_time == pytest.approx(0.1, abs=0.02)
+        assert np.median([each.scan_time for each in bench.scans]) == pytest.approx(0.1, abs=0.02)
         assert scan.time_increment < 0.0
         assert 0.0 <= time.monotonic() - scan.stamp_s < 0.5
         assert bench.driver.counts.lost_bytes == 0
@@ -141,7 +145,7 @@ def test_a_broken_unit_is_refused_with_its_code(tmp_path):
 
 def test_a_unit_at_no_speed_of_an_rplidar_is_refused(tmp_path):
     bench = Bench(tmp_path / "lidar", Model(baud=9600))
-    bench.unit.pwm, bench.unit.mode = 660, STANDARD_MODE  # it streams, so something is heard
+    bench.unit.begin(STANDARD_MODE, 660, time.monotonic())  # it streams, so something is heard
     assert "is no RPLIDAR" in failure_of(bench.supervisor).what
     bench.wire.close()
 
@@ -176,12 +180,62 @@ def test_unplugged_it_says_so_and_comes_back_by_itself(tmp_path):
 def test_a_unit_that_falls_silent_is_lost(tmp_path):
     with Bench(tmp_path / "lidar") as bench:
         bench.wait_scans(1)
-        bench.unit.pwm = 0
+        bench.unit.mode = None
         until_s = time.monotonic() + 2.0
         while bench.supervisor.alive:
             assert time.monotonic() < until_s
             time.sleep(0.01)
         assert "fell silent" in str(bench.supervisor.failure)
+
+
+def test_a_motor_that_needs_longer_than_its_time_is_waited_for(tmp_path):
+    with Bench(tmp_path / "lidar", Model(spin_up_s=3.0)) as bench:
+        bench.wait_scans(1, 9.0)
+        assert (bench.supervisor.sessions, bench.supervisor.failure) == (1, None)
+
+
+def test_a_unit_that_ends_its_scan_when_its_motor_is_told_goes_on(tmp_path):
+    with Bench(tmp_path / "lidar", Model(hz_at_660=11.5, pwm_ends_scan=True)) as bench:
+        until_s = time.monotonic() + 15.0
+        while bench.unit.pwm in (0, 660):
+            assert time.monotonic() < until_s, bench.supervisor.failure
+            time.sleep(0.01)
+        bench.wait_scans(5)
+        assert bench.supervisor.losses == 0
+        assert bench.driver.diagnostics().values
+
+
+def test_noise_is_no_scan_and_the_head_turns_on_meanwhile(tmp_path):
+    with Bench(tmp_path / "lidar") as bench:
+        bench.wait_scans(1)
+        sound = bench.unit.emit
+        bench.unit.emit = lambda now_s: bytes(len(sound(now_s)))
+        until_s = time.monotonic() + 8.0
+        while bench.supervisor.alive:
+            assert time.monotonic() < until_s
+            time.sleep(0.01)
+        assert "sends nothing that is a scan" in str(bench.supervisor.failure)
+        assert bench.unit.pwm > 0
+        bench.unit.emit = sound
+        bench.wait_scans(1, 12.0)
+        bench.unit.emit = lambda now_s: bytes(len(sound(now_s)))
+        while bench.supervisor.alive:
+            time.sleep(0.01)
+        bench.unit.emit = sound
+    assert bench.unit.pwm == 0  # closed between two tries
+
+
+def test_a_warning_and_what_it_does_is_told(tmp_path):
+    with Bench(tmp_path / "lidar", replace(MODELS["a2m8-1.29"], warning=0x0042, spin_up_s=0.0)) as bench:
+        bench.wait_scans(3)
+        told = bench.driver.diagnostics()
+    assert told.level == 1
+    assert "0x0042" in told.message
+    values = dict(told.values)
+    assert values["firmware"] == "1.29"
+    assert values["mode"] == "Sensitivity (0x84)"
+    assert float(values["samples/s"]) == pytest.approx(7874, rel=0.1)
+    assert values["bytes lost"] == "0"
 
 
 def test_what_is_missing_or_no_lidar_is_named(tmp_path):
@@ -233,10 +287,11 @@ def test_the_motor_stops_on_sigterm_and_a_killed_program_does_not_spoil_the_next
         assert around(bench.wait_scans(1), 0) == pytest.approx(1.0, abs=0.02)
 
 
-@pytest.fixture(scope="module", params=["EXPRESS", "DENSE", "STANDARD"])
+@pytest.fixture(scope="module", params=["EXPRESS", "ULTRA", "DENSE", "STANDARD"])
 def scanning(request, tmp_path_factory):
-    modes = {"EXPRESS": EXPRESS_MODE, "DENSE": DENSE_MODE, "STANDARD": STANDARD_MODE}
-    with Bench(tmp_path_factory.mktemp("wire") / "lidar", Model(modes=(modes[request.param],))) as bench:
+    modes = {"EXPRESS": EXPRESS_MODE, "ULTRA": ULTRA_MODE, "DENSE": DENSE, "STANDARD": STANDARD_MODE}
+    model = Model(baud=256000, modes=(STANDARD_MODE, modes[request.param]))
+    with Bench(tmp_path_factory.mktemp("wire") / "lidar", model) as bench:
         bench.wait_scans(1)
         yield bench
 
@@ -255,4 +310,4 @@ HEADS = st.builds(descriptor, st.integers(0, 2**30 - 1), st.integers(0, 255))
 def test_whatever_comes_over_its_line_it_scans_on(scanning, odd):
     scanning.wire.inject(odd)
     scanning.wait_scans(3, 10.0)
-    assert scanning.supervisor.losses == 0
+    assert scanning.supervisor.losses == 0, scanning.supervisor._failure

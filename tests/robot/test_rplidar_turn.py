@@ -7,12 +7,14 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from lira.hal.profile import load_profile
-from lira.robot.rplidar.device import Counts, Stream
-from lira.robot.rplidar.points import parse_dense
+from lira.hal.safety.protective_field import measure_clearance
+from lira.robot.rplidar.capsules import DENSE, CapsuleDecoder
+from lira.robot.rplidar.stream import Counts, Stream
 from lira.robot.rplidar.turn import Mounting, Turn, TurnCutter, scan_of
-from lira.sim_backend.emulators.rplidar import encode_dense
+from lira.sim_backend.emulators.rplidar_streams import encode_dense
 
-LIDAR = load_profile("rosbot2").lidar
+PROFILE = load_profile("rosbot2")
+LIDAR = PROFILE.lidar
 POINTS = 400
 
 
@@ -97,14 +99,86 @@ def test_ranges_are_named_after_rep_117_and_the_nearest_counts():
 
 
 def test_too_little_of_a_turn_is_no_scan():
-    turn = cut(*spin(3.0, points=100))[0]
-    assert scan_of(turn, LIDAR) is None
+    turn = cut(*spin(3.0))[0]
+    half = slice(0, 180)
+    assert scan_of(Turn(turn.bearing_rad[half], turn.distance_m[half], turn.time_s[half]), LIDAR) is None
+
+
+def evenly(points, zeros=0.0, seed=0):
+    """A turn in a hall with walls at 2 m, in which a share of the samples measures nothing."""
+    rng = np.random.default_rng(seed)
+    bearing = np.linspace(math.pi, -math.pi, points, endpoint=False) + rng.uniform(-1e-3, 1e-3)
+    distance = np.where(rng.random(points) < zeros, 0.0, 2.0)
+    return Turn((bearing + math.pi) % math.tau - math.pi, distance, np.linspace(0.0, 0.1, points))
+
+
+@pytest.mark.parametrize("points", [98, 133, 200, 266, 333, 364, 400, 800])
+@pytest.mark.parametrize("zeros", [0.0, 0.1, 0.2])
+def test_the_field_drives_in_every_mode_and_at_every_speed_of_the_head(points, zeros):
+    for seed in range(20):
+        clearance = measure_clearance(PROFILE, PROFILE.field, scan_of(evenly(points, zeros, seed), LIDAR))
+        assert clearance.ahead_m > 1.5
+        assert clearance.behind_m > 1.5
+
+
+def test_a_beam_that_no_point_fell_into_has_the_nearer_of_its_neighbours():
+    turn = evenly(200)
+    ahead = np.abs(turn.bearing_rad) < math.radians(10.0)
+    scan = scan_of(Turn(turn.bearing_rad, np.where(ahead, 1.0, 2.0), turn.time_s), LIDAR)
+    near = np.count_nonzero(scan.ranges == 1.0)
+    assert np.count_nonzero(np.isfinite(scan.ranges)) == LIDAR.beams
+    assert near >= np.count_nonzero(ahead) * 2
+
+
+def test_what_measured_nothing_over_a_width_stays_unknown():
+    turn = evenly(800)
+    blind = np.abs(turn.bearing_rad) < math.radians(30.0)
+    scan = scan_of(Turn(turn.bearing_rad, np.where(blind, 0.0, 2.0), turn.time_s), LIDAR)
+    assert np.count_nonzero(np.isnan(scan.ranges)) > 60
+    assert measure_clearance(PROFILE, PROFILE.field, scan).ahead_m == 0.0
+    nothing = scan_of(Turn(turn.bearing_rad, np.zeros(800), turn.time_s), LIDAR)
+    assert np.isnan(nothing.ranges).all()
+
+
+def test_points_that_were_lost_are_no_neighbours():
+    turn = evenly(800)
+    here = np.abs(turn.bearing_rad) > math.radians(20.0)
+    scan = scan_of(Turn(turn.bearing_rad[here], turn.distance_m[here], turn.time_s[here]), LIDAR)
+    assert np.count_nonzero(np.isnan(scan.ranges)) > 35
+
+
+def test_angles_that_step_back_over_the_seam_belong_to_the_turn_that_ends_there():
+    theta, distance, time = spin(4.5, points=800)
+    ahead = np.arange(len(theta)) % 3 == 0  # every third is not corrected
+    theta = np.where(ahead, theta + math.radians(7.0), theta) % math.tau
+    cutter = TurnCutter(Mounting(), math.radians(8.0))
+    turns = []
+    for at in range(0, len(theta), 7):
+        turns += cutter.add(theta[at : at + 7], distance[at : at + 7], time[at : at + 7])
+    assert len(turns) == 4
+    for turn in turns:
+        assert abs(len(turn.time_s) - 800) <= 2
+        corrected = turn.time_s[np.argsort(turn.bearing_rad)]
+        assert corrected[:10].min() > corrected[-10:].max()  # the rear, one side of the seam, was seen last
+
+
+def test_scans_in_the_order_of_time_are_the_same_scans():
+    turn = cut(*spin(3.0))[0]
+    scan, ascending = scan_of(turn, LIDAR), scan_of(turn, LIDAR, ascending_time=True)
+    assert ascending.time_increment == -scan.time_increment > 0.0
+    assert ascending.angle_increment == -scan.angle_increment
+    beams = np.arange(LIDAR.beams)
+    angles, times = scan.angle_min + beams * scan.angle_increment, scan.stamp_s + beams * scan.time_increment
+    assert (ascending.angle_min + beams * ascending.angle_increment)[::-1] == pytest.approx(angles)
+    assert (ascending.stamp_s + beams * ascending.time_increment)[::-1] == pytest.approx(times)
+    np.testing.assert_array_equal(ascending.ranges[::-1], scan.ranges)
+    assert measure_clearance(PROFILE, PROFILE.field, ascending).ahead_m > 1.5
 
 
 def test_a_burst_of_bytes_keeps_each_points_time():
     theta, distance, _ = spin(3.0, points=1600)
     capsules = encode_dense(theta[::40], distance.reshape(-1, 40), first=True)
-    stream = Stream(parse_dense, 62.5e-6, TurnCutter(Mounting()), LIDAR, Counts())
+    stream = Stream(CapsuleDecoder(DENSE, 62.5e-6), 62.5e-6, 0.0, TurnCutter(Mounting()), LIDAR, Counts())
     scans = stream.feed(capsules[:5000], 100.0) + stream.feed(capsules[5000:], 100.155)
     assert len(scans) == 2
     for scan in scans:

@@ -6,6 +6,7 @@ import msgspec
 import numpy as np
 import pytest
 
+from lira.fusion.modalities.depth import near_depth
 from lira.fusion.modalities.image import gray_image, to_uint8
 from lira.fusion.modalities.scan import bin_scan
 from lira.hal.messages import Command, Twist
@@ -279,6 +280,80 @@ def test_a_box_on_the_line_is_black_where_the_line_is_black(look, name, distance
     assert boxed.min() == 0
     assert (boxed <= plain + 1)[plain < 170].all()
     assert ((boxed == 0) & (plain < 170)).sum() >= 3
+
+
+# table-top: the lidar is fooled, and so is the camera; depth is not
+
+SEES_DEPTH = load_profile("thesis-sim-depth")
+TABLE_TOPS = load_world("table-top")
+FRONT_M = 4.0
+
+
+def hung(*, top=False, box=False, line=True):
+    """The world of table tops with one of them across its line, or one of its boxes, or nothing."""
+    (kind,) = TABLE_TOPS.along
+    place = {"x_m": FRONT_M + kind.size_m / 2, "y_m": 0.0, "length_m": kind.size_m, "width_m": kind.size_m}
+    tops = (Box(**place, bottom_m=kind.tops_m[0], height_m=kind.tops_m[1], gray=kind.tops_gray),)
+    boxes = (Box(**place, height_m=kind.size_m, gray=kind.gray),)
+    drawn = TABLE_TOPS.line if line else None
+    limits = TABLE_TOPS.limits if line else Limits(lost_m=2.0, finish_m=9.0)
+    hanging = (tops if top else ()) + (boxes if box else ())
+    return msgspec.structs.replace(TABLE_TOPS, along=(), box=hanging, line=drawn, limits=limits)
+
+
+def depth_before(world, distance_m, renderer="tiny"):
+    """What the networks see of the depth that far before the front: float32 [32, 32]."""
+    sensors = Sensors(SEES_DEPTH, build(world, 0), renderer, 0)
+    try:
+        seen = sensors.read("depth", drive.motion(FRONT_M - distance_m, 0.0, 0.0), 0.0)
+    finally:
+        sensors.close()
+    return near_depth(seen, SEES_DEPTH.features.image_px, 4.0)
+
+
+def test_in_the_world_of_table_tops_half_of_what_is_in_the_way_hangs_in_every_layout():
+    for layout in range(4):
+        blocks = build(TABLE_TOPS, layout).blocks
+        tops = [block for block in blocks if block.bottom_m > 0.0]
+        assert (len(blocks), len(tops)) == (8, 4)
+        assert all(block.in_the_way for block in blocks)
+        for top in tops:
+            assert SEES_DEPTH.lidar.z_m < top.bottom_m < top.bottom_m + top.height_m < SEES_DEPTH.camera.z_m
+            assert top.gray == TABLE_TOPS.ground_gray
+
+
+@pytest.mark.parametrize("distance_m", [0.4, 0.8, 1.5, 3.0])
+def test_the_lidar_looks_below_a_table_top(look, distance_m):
+    pose = (FRONT_M - distance_m, 0.0, 0.0)
+    top, box, nothing = (look(each, pose)[1] for each in (hung(top=True), hung(box=True), hung()))
+    assert (top == nothing).all()
+    assert not (box == nothing).all()
+
+
+@pytest.mark.parametrize("distance_m", [0.4, 0.8, 1.5, 3.0])
+def test_the_camera_cannot_tell_a_table_top_from_the_floor(look, distance_m):
+    pose = (FRONT_M - distance_m, 0.0, 0.0)
+    bare = {"top": hung(top=True, line=False), "nothing": hung(line=False)}
+    assert (look(bare["top"], pose)[0] == look(bare["nothing"], pose)[0]).all()
+    # Where there is a line it hides a little of what is far ahead: nothing beside what a black box does.
+    top, box, nothing = (look(each, pose)[0] for each in (hung(top=True), hung(box=True), hung()))
+    assert np.abs(top - nothing).sum() < 0.06 * np.abs(box - nothing).sum()
+
+
+@pytest.mark.parametrize("renderer", ["tiny", "sketch"])
+@pytest.mark.parametrize("distance_m", [0.4, 0.8, 1.5, 3.0])
+def test_depth_sees_how_far_a_table_top_is(distance_m, renderer):
+    top, nothing = (depth_before(each, distance_m, renderer) for each in (hung(top=True), hung()))
+    changed = top < nothing - 0.05
+    assert changed[:, 15:17].any()
+    seen_m = top[changed].min() * 4.0
+    along_m = (distance_m - SEES_DEPTH.camera.x_m) * math.cos(SEES_DEPTH.camera.pitch_rad)  # its optical axis
+    assert seen_m == pytest.approx(along_m, abs=0.02)
+
+
+def test_who_drives_on_hits_the_table_top():
+    assert drive_straight(hung(top=True, line=False), FRONT_M - 1.0, 0.0).collided
+    assert not drive_straight(hung(line=False), FRONT_M - 1.0, 0.0).collided
 
 
 # Paint

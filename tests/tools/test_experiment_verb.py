@@ -60,3 +60,17 @@ def test_all_experiments_end_in_results(short_race, tmp_path):
     out.unlink()
     assert main(["experiment", "results", *where]) == 0
     assert out.read_text() == lead
+
+
+def test_unseen_layouts_are_asked_for_in_any_world(tmp_path, capsys):
+    world, out = write_world(tmp_path), tmp_path / "F.json"
+    asked = ["--seeds", "1", "--first-seed", "230", "--methods", "plus", "--ways", "plain", "--world", world]
+    assert main(["experiment", "unseen", *asked, "--run", str(tmp_path / "run"), "--json", str(out)]) == 0
+    assert "Effort to 90% of fresh layouts" in capsys.readouterr().out
+    report = json.loads(out.read_text())
+    assert report["name"] == "unseen-short"
+    row = report["quality"][0]
+    assert {"method", "pair", "n", "human_labels", "interventions", "unseen_laps", "unseen_passed"} <= set(row)
+    assert {"collisions", "censored", "human_labels_90", "human_labels_max"} <= set(row)
+    assert (row["method"], row["pair"], row["n"], row["unseen_laps"]) == ("plus", "line", 1, 12)
+    assert (tmp_path / "run" / "unseen-short.html").exists()

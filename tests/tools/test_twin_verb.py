@@ -35,6 +35,16 @@ def test_an_unknown_profile_names_the_known_ones():
     assert "rosbot2, thesis-sim" in done.stderr
 
 
+def test_a_lidar_is_one_of_those_that_there_are_and_goes_with_the_wire(tmp_path):
+    done = lira("twin", "--wire", str(tmp_path), "--lidar", "a2m9", "--profile", "rosbot2", "--world", "room")
+    assert done.returncode == 2
+    assert "there is no lidar 'a2m9'" in done.stderr
+    assert "a2m8-1.20, a2m8-1.29, a2m7, a2m12, a1, a3" in done.stderr
+    alone = lira("twin", "--lidar", "a3")
+    assert alone.returncode == 2
+    assert "--lidar goes with --wire" in alone.stderr
+
+
 def test_a_world_file_with_a_typo_names_file_and_key(tmp_path):
     path = tmp_path / "mine.toml"
     path.write_text('description = "x"\n[limits]\nlost_m = 1.0\nfinish_m = 5.0\nfinnish_m = 1.0\n')

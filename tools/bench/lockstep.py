@@ -24,7 +24,7 @@ from lira.fusion.methods.base import Method
 from lira.fusion.methods.presets import METHODS
 from lira.hal.bus.topics import DECISION
 from lira.hal.client.remote import RemoteArena, RemoteRobot, connect
-from lira.hal.messages import Episode
+from lira.hal.messages import Episode, Phase
 from lira.tools.bench import Row
 from lira.tools.launch.processes import ChildProcess, free_port, lira_command
 from lira.tools.runs.build import build_method
@@ -50,7 +50,19 @@ def measure(layout: int) -> dict[str, float]:
     """Drive one layout and return how many simulated seconds went by per second, and what was done in them."""
     port = free_port()
     name, endpoint = f"bench_{port}", f"127.0.0.1:{port}"
-    words = ["--name", name, "--world", WORLD, "--layout", str(layout), "--listen", endpoint, "--lockstep"]
+    words = [
+        "--name",
+        name,
+        "--world",
+        WORLD,
+        "--layout",
+        str(layout),
+        "--listen",
+        endpoint,
+        "--lockstep",
+        "--renderer",
+        "sketch",
+    ]
     with (
         TemporaryDirectory() as folder,
         ChildProcess("the twin", lira_command("twin", *words), Path(folder) / "twin.log") as twin,
@@ -101,7 +113,7 @@ def drive_until(
         step = loop.step(method)
         if step is None:
             continue
-        journal.note(step, phase="train", lap=1, layout=layout, training_steps=method.novice.training_steps)
+        journal.note(step, phase=Phase.TRAIN, lap=1, layout=layout, training_steps=method.novice.training_steps)
         state = step.state
         if state is not None and (state.collided or state.lost or state.finished):
             start_m = 0.0 if state.finished else max(state.progress_m, 0.0) + PUT_ON_M

@@ -16,6 +16,7 @@ from lira.fusion.learning.learner import Label, Learner
 from lira.fusion.log.label_log import Demonstration, DemonstrationLog, read_demonstrations
 from lira.fusion.policies.networks import FusionNet
 from lira.fusion.preprocess import Features, shapes_of
+from lira.hal.messages import Driver
 from lira.hal.profile import load_profile
 from lira.tools.bench import Row
 
@@ -68,7 +69,7 @@ def random_labels(count: int) -> Iterator[Label]:
         grays = {name: (rng.integers(0, 256, shape) / 255).astype(np.float32) for name, shape in shapes.items()}
         return Features(**grays)
 
-    kinds = [Label(noise(), (1.0, float(rng.uniform(-1, 1))), "human") for _ in range(KINDS)]
+    kinds = [Label(noise(), (1.0, float(rng.uniform(-1, 1))), Driver.HUMAN) for _ in range(KINDS)]
     for k in range(count):
         yield kinds[k % KINDS]
 

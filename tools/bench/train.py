@@ -11,6 +11,7 @@ from lira.fusion.learning.learner import Label, Learner
 from lira.fusion.learning.trainer import ProcessTrainer
 from lira.fusion.policies.networks import ExpertNet, FusionNet
 from lira.fusion.preprocess import Features, Shape
+from lira.hal.messages import Driver
 from lira.tools.bench import Row
 
 RUNS = 5
@@ -61,7 +62,7 @@ def random_labels(bins: int) -> list[Label]:
     def label() -> Label:
         image = (rng.integers(0, 256, (32, 32)) / 255).astype(np.float32)
         seen = Features(image=image, scan=rng.random(bins, dtype=np.float32))
-        return Label(seen, (float(rng.random()), float(rng.random())), "human")
+        return Label(seen, (float(rng.random()), float(rng.random())), Driver.HUMAN)
 
     return [label() for _ in range(LABELS)]
 

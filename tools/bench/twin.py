@@ -14,6 +14,7 @@ import numpy as np
 from lira.hal.messages import Command, Episode, Observation, Twist
 from lira.hal.profile import RobotProfile, load_profile
 from lira.sim_backend.camera import PinholeCamera
+from lira.sim_backend.catalogue import load_world
 from lira.sim_backend.lidar import RayLidar
 from lira.sim_backend.scenes.base import Pose
 from lira.sim_backend.scenes.bullet import BulletScene
@@ -44,7 +45,7 @@ Call = Callable[[], object]
 
 def run() -> list[Row]:
     """Return a row for each profile and scene: pybullet's are left out where it is not installed."""
-    renderers: list[Renderer] = ["sketch", "auto"] if settle("auto") == "auto" else ["sketch"]
+    renderers: list[Renderer] = ["sketch", "auto"] if settle("auto", load_world(WORLD)) == "auto" else ["sketch"]
     return [measure(load, renderer) for load in LOADS for renderer in renderers]
 
 

@@ -5,7 +5,9 @@ import math
 from lira.hal.messages import (
     Applied,
     BatteryState,
+    Call,
     Decision,
+    Driver,
     Episode,
     ExpertView,
     Image,
@@ -44,7 +46,19 @@ def sample_view() -> View:
     )
     counts = LabelCounts(stored_human=38, stored_expert=71, demonstration=30)
     decision = Decision(
-        seen.stamp_s, seen.seq, "novice", "feedback", (0.62, -0.18), (0.62, -0.18), None, experts, 0.06, counts, 4, 5, 9
+        seen.stamp_s,
+        seen.seq,
+        Driver.NOVICE,
+        Call.FEEDBACK,
+        (0.62, -0.18),
+        (0.62, -0.18),
+        None,
+        experts,
+        0.06,
+        counts,
+        4,
+        5,
+        9,
     )
     twist = Twist(0.19, -0.05)
     return View(

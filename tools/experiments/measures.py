@@ -7,6 +7,7 @@ import numpy as np
 
 from lira.fusion.experts.tasks import TASKS, task_of
 from lira.fusion.log.run_log import LapRecord
+from lira.hal.messages import Driver, Phase
 from lira.hal.profile import load_profile
 from lira.tools.experiments.experiment import Outcomes, Row
 from lira.tools.experiments.statistics import iqm
@@ -68,7 +69,7 @@ def effort_row(group: Sequence[Outcome]) -> Row:
     return {
         "demonstration": median(shown),
         "human_time_s": median([each.human_steps * period_s for each in accounts]),
-        "human_given": median([each.given.get("human", 0) for each in accounts]),
+        "human_given": median([each.given.get(Driver.HUMAN, 0) for each in accounts]),
         "expert_stored": median([experts_share(each.stored) for each in accounts]),
         "calls": median([outcome.result.calls for outcome in group]),
         "call_episodes": median([each.call_episodes for each in accounts]),
@@ -95,12 +96,12 @@ def source_rows(outcomes: Outcomes) -> list[Row]:
 
 def driving_row(group: Sequence[Outcome]) -> Row:
     """How it was driven: collisions while it was taught, and how the novice drives layouts it has not seen."""
-    taught = [lap for outcome in group for lap in outcome.laps if lap.phase == "train"]
-    unseen = [lap for outcome in group for lap in outcome.laps if lap.phase == "unseen"]
+    taught = [lap for outcome in group for lap in outcome.laps if lap.phase == Phase.TRAIN]
+    unseen = [lap for outcome in group for lap in outcome.laps if lap.phase == Phase.UNSEEN]
     return {
         "training_collisions": sum(lap.collisions for lap in taught),
         "training_lost": sum(lap.lost for lap in taught),
-        "laps_without_human": sum(any(lap.unassisted for lap in o.laps if lap.phase == "train") for o in group),
+        "laps_without_human": sum(any(lap.unassisted for lap in o.laps if lap.phase == Phase.TRAIN) for o in group),
         "unseen_laps": len(unseen),
         "unseen_passed": sum(lap.passed for lap in unseen),
         "unseen_collisions": sum(lap.collisions for lap in unseen),
@@ -117,7 +118,7 @@ def time_to_finish_s(lap: LapRecord) -> float | None:
 
 def experts_share(counts: dict[str, int]) -> int:
     """Labels that no human gave."""
-    return sum(counts.values()) - counts.get("human", 0) - counts.get("demonstration", 0)
+    return sum(counts.values()) - counts.get(Driver.HUMAN, 0) - counts.get("demonstration", 0)
 
 
 @cache

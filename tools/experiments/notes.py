@@ -8,13 +8,13 @@ import msgspec
 from lira.fusion.log.counts import DEMONSTRATION
 from lira.fusion.log.label_log import Demonstration
 from lira.fusion.log.run_log import LapRecord, Record, StepRecord
-from lira.hal.messages import Action
+from lira.hal.messages import Action, Driver, Phase
 
 
 class Track(msgspec.Struct, frozen=True):
     """Where one lap went, decision by decision; whole millimetres keep it small."""
 
-    phase: str
+    phase: Phase
     lap: int
     layout: int
     x_mm: tuple[int, ...]
@@ -73,14 +73,14 @@ class Notes:
     @property
     def tracks(self) -> tuple[Track, ...]:
         """The first training lap and everything from the last one on."""
-        last = max((track.lap for track in self._tracks if track.phase == "train"), default=0)
-        return tuple(track for track in self._tracks if track.phase == "unseen" or track.lap in (1, last))
+        last = max((track.lap for track in self._tracks if track.phase == Phase.TRAIN), default=0)
+        return tuple(track for track in self._tracks if track.phase == Phase.UNSEEN or track.lap in (1, last))
 
 
 def source(record: StepRecord) -> str:
     """Who gave the label of a step, as in `Account`."""
     driver = record.decision.driver
-    return DEMONSTRATION if driver == "human" and record.decision.training_steps == 0 else driver
+    return DEMONSTRATION if driver == Driver.HUMAN and record.decision.training_steps == 0 else driver
 
 
 def rounded(action: Action) -> Action:

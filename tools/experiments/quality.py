@@ -20,6 +20,7 @@ from lira.fusion.methods.base import Method
 from lira.fusion.methods.shield import Shield, Shielded
 from lira.fusion.methods.stop_and_ask import Doubtful
 from lira.fusion.teaching.session import Session
+from lira.hal.messages import Phase
 from lira.hal.profile import Field, RobotProfile, load_profile
 from lira.sim_backend.foresight import with_small_camera
 from lira.sim_backend.world import World
@@ -223,6 +224,6 @@ def _try(
 def _driver(method: Method, way: Way, profile: RobotProfile) -> Method:
     if way == "ask":
         novice = method.novice
-        return Doubtful(novice.alone, novice.doubts) if isinstance(novice, KernelNovice) else method.alone("unseen")
-    alone = method.alone("unseen")
+        return Doubtful(novice.alone, novice.doubts) if isinstance(novice, KernelNovice) else method.alone(Phase.UNSEEN)
+    alone = method.alone(Phase.UNSEEN)
     return Shielded(alone, Shield(profile)) if way == "shield" else alone

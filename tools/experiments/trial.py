@@ -15,10 +15,11 @@ from lira.fusion.methods.base import Method
 from lira.fusion.methods.presets import Preset as Preset
 from lira.fusion.methods.presets import file_name
 from lira.fusion.teaching.teacher import SKILLED, ScriptedTeacher, TeacherSettings
-from lira.hal.messages import Action
+from lira.hal.messages import Action, Phase
 from lira.hal.profile import RobotProfile, load_profile
 from lira.sim_backend.catalogue import load_world
 from lira.sim_backend.foresight import with_small_camera
+from lira.sim_backend.scenes.opening import quickest
 from lira.sim_backend.world import World
 from lira.tools.experiments.notes import Notes, Track
 from lira.tools.experiments.quality import Judged, Point, Quality, Tape, judging, teach_to
@@ -83,7 +84,7 @@ class Outcome(msgspec.Struct, frozen=True):
 
     def after(self, lap_number: int) -> LapRecord:
         """Totals after a training lap (the last one if there were fewer; the proving run if there was none)."""
-        return ([each for each in self.laps if each.phase == "train"] or list(self.laps))[:lap_number][-1]
+        return ([each for each in self.laps if each.phase == Phase.TRAIN] or list(self.laps))[:lap_number][-1]
 
 
 def play(trial: Trial) -> Outcome:
@@ -104,7 +105,9 @@ def play(trial: Trial) -> Outcome:
         layouts if not trial.quality else (),
     )
     with (
-        simulate(world, with_small_camera(profile), layout=trial.seed, seed=trial.seed, renderer="sketch") as robot,
+        simulate(
+            world, with_small_camera(profile), layout=trial.seed, seed=trial.seed, renderer=quickest(world)
+        ) as robot,
         closing(build_method(trial.method, profile, trial.seed, InlineTrainer, trial.pair)) as method,
         closing(teacher(trial.skill, profile, world, trial.seed, trial.seed)) as hand,
     ):

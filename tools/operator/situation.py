@@ -17,7 +17,7 @@ The first of these rules that holds decides: who must act comes before who drive
 
 from enum import StrEnum
 
-from lira.hal.messages import Applied, Decision, Reason, Source
+from lira.hal.messages import Applied, Call, Decision, Driver, Phase, Reason, Source
 from lira.tools.operator.view import View
 
 HAND_DRIVES = "driving"
@@ -145,14 +145,14 @@ def _driving(decision: Decision | None) -> Situation:
     """Which policy drives, and why it is that one."""
     if decision is None:
         return _S.POLICY
-    if decision.driver == "shield":
-        return _S.SHIELD_STANDS if decision.call == "feedback" else _S.SHIELD
-    if decision.call == "feedback":
-        if decision.driver in ("nobody", "human"):
+    if decision.driver == Driver.SHIELD:
+        return _S.SHIELD_STANDS if decision.call == Call.FEEDBACK else _S.SHIELD
+    if decision.call == Call.FEEDBACK:
+        if decision.driver == Driver.NOBODY:
             return _S.WAITS if decision.training_steps == 0 and not decision.labels.demonstration else _S.UNKNOWN
         return _S.DISAGREE
-    if decision.phase in ("prove", "unseen"):
+    if decision.phase in (Phase.PROVE, Phase.UNSEEN):
         return _S.PROVING
-    if decision.driver in ("novice", "mean"):
+    if decision.driver in (Driver.NOVICE, Driver.MEAN):
         return Situation(decision.driver)
-    return _S.ONE_EXPERT if decision.call == "attention" else _S.EXPERT
+    return _S.ONE_EXPERT if decision.call == Call.ATTENTION else _S.EXPERT

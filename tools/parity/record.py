@@ -13,7 +13,7 @@ from lira.hal.clock import ClockEstimate
 from lira.hal.errors import BusError, ConfigError
 from lira.hal.messages import STOP, Applied, CompressedImage, Imu, LaserScan, Odometry, Reason, Source, session_of
 from lira.hal.profile import RobotProfile
-from lira.tools.parity.script import Phase, motions
+from lira.tools.parity.script import Leg, motions
 
 S = TypeVar("S", bound=Stamped)
 
@@ -41,7 +41,7 @@ class Heard(Generic[S]):
 class Span:
     """A phase as it was driven: from its first command to the next phase's, on the robot's clock."""
 
-    phase: Phase
+    phase: Leg
     began_s: float
     ended_s: float
 
@@ -107,7 +107,7 @@ class _Driver:
         for _, kept in self._readers:
             kept.clear()
 
-    def drive(self, phase: Phase) -> None:
+    def drive(self, phase: Leg) -> None:
         began_s = self.now()
         end_s, send_s = began_s + phase.duration_s, began_s
         while (now_s := self.now()) < end_s:
@@ -136,7 +136,7 @@ class _Driver:
         newest = self.recording.applied[-1].message
         return newest.reason is Reason.OK and (newest.source, newest.session) == (Source.POLICY, self._session)
 
-    def _check(self, phase: Phase) -> None:
+    def _check(self, phase: Leg) -> None:
         """Raise if the robot did something else in the end."""
         if not self._obeys():
             applied = self.recording.applied[-1].message if self.recording.applied else None

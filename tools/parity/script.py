@@ -14,7 +14,7 @@ TURN_RAD = 1.6
 
 
 @dataclass(frozen=True, slots=True)
-class Phase:
+class Leg:
     """A constant command."""
 
     name: str
@@ -22,7 +22,7 @@ class Phase:
     duration_s: float
 
 
-def motions(base: Base) -> tuple[Phase, ...]:
+def motions(base: Base) -> tuple[Leg, ...]:
     """Return the script for a base: stand, ahead and back, left and right, each from rest to rest.
 
     Half its top speed, or less where that would go farther than `REACH_M` or turn by more than `TURN_RAD`.
@@ -35,7 +35,7 @@ def motions(base: Base) -> tuple[Phase, ...]:
         "left": Twist(0.0, angular_rad_s),
         "right": Twist(0.0, -angular_rad_s),
     }
-    script = [Phase("stand", STOP, STAND_S)]
+    script = [Leg("stand", STOP, STAND_S)]
     for name, twist in steps.items():
-        script += [Phase(name, twist, STEP_S), Phase(f"{name} stop", STOP, REST_S)]
+        script += [Leg(name, twist, STEP_S), Leg(f"{name} stop", STOP, REST_S)]
     return tuple(script)

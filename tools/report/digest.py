@@ -6,16 +6,16 @@ from pathlib import Path
 
 from lira.fusion.log.run_log import LapRecord, Record, ResultRecord, RunRecord, StepRecord, read_run
 from lira.hal.errors import StorageError
-from lira.hal.messages import Action
+from lira.hal.messages import Action, Driver, Phase
 
-PHASES = {"train": "Training lap", "prove": "Proving run", "unseen": "Unseen layout"}
+PHASES = {Phase.TRAIN: "Training lap", Phase.PROVE: "Proving run", Phase.UNSEEN: "Unseen layout"}
 
 
 @dataclass(frozen=True, slots=True)
 class Lap:
     """The steps of one lap in order; `record` is None for a lap that was cut off."""
 
-    phase: str
+    phase: Phase
     number: int
     layout: int
     steps: tuple[StepRecord, ...]
@@ -25,7 +25,7 @@ class Lap:
     def title(self) -> str:
         """Name for headings: a training lap by its number, the others by what they prove."""
         name = PHASES.get(self.phase, self.phase)
-        return f"{name} {self.layout}" if self.phase == "unseen" else f"{name} {self.number}"
+        return f"{name} {self.layout}" if self.phase == Phase.UNSEEN else f"{name} {self.number}"
 
     @property
     def began_s(self) -> float:
@@ -60,7 +60,7 @@ class Run:
         actions: dict[str, list[Action]] = {"human": [], "expert": []}
         for _, step in self.steps():
             if step.label is not None:
-                actions["human" if step.label == "human" else "expert"].append(step.decision.executed)
+                actions["human" if step.label == Driver.HUMAN else "expert"].append(step.decision.executed)
         return actions
 
 
@@ -98,7 +98,7 @@ class _Sorter:
         self.steps = []
 
 
-def _key(step: StepRecord) -> tuple[str, int, int]:
+def _key(step: StepRecord) -> tuple[Phase, int, int]:
     return step.decision.phase, step.decision.lap, step.layout
 
 

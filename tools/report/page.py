@@ -9,6 +9,7 @@ from importlib import resources
 import cv2
 import numpy as np
 
+from lira.hal.messages import Call, Driver, Phase
 from lira.tools.output.proven import contradiction_words, proof_words, unseen_words
 from lira.tools.report import plots
 from lira.tools.report.course import course
@@ -52,7 +53,7 @@ def head(run: Run, title: str) -> str:
         ]
         parts.append(f'<p class="muted">{escape(" · ".join(facts))}</p>')
     parts.append(f'<dl class="tiles">{"".join(map(tile, figures(run)))}</dl>')
-    unseen = [lap.record for lap in run.phase("unseen") if lap.record]
+    unseen = [lap.record for lap in run.phase(Phase.UNSEEN) if lap.record]
     if unseen:
         words = unseen_words(unseen)
         parts.append(f"<p>{words[0].upper()}{words[1:]}.</p>")
@@ -85,7 +86,7 @@ def figures(run: Run) -> Iterable[tuple[str, str]]:
         yield "simulated time", clock(result.simulated_s)
         if result.elapsed_s > 0:
             yield "times real time", f"{result.simulated_s / result.elapsed_s:.0f}"
-    training = run.phase("train")
+    training = run.phase(Phase.TRAIN)
     alone = [lap.number for lap in training if lap.record and lap.record.unassisted]
     if training:
         yield "lap without help", f"lap {alone[0]}" if alone else "none"
@@ -109,10 +110,10 @@ def lap_table(run: Run) -> str:
 
 def top_views(run: Run) -> str:
     """Where each lap went: training, the last proving run, every unseen layout."""
-    training = run.phase("train")
+    training = run.phase(Phase.TRAIN)
     if len(training) > TRAINING_VIEWS:
         training = training[: TRAINING_VIEWS // 2] + training[-(TRAINING_VIEWS // 2) :]
-    laps = [*training, *run.phase("prove")[-1:], *run.phase("unseen")]
+    laps = [*training, *run.phase(Phase.PROVE)[-1:], *run.phase(Phase.UNSEEN)]
     figures = []
     for lap in laps:
         floor = course(run.head.world, lap.layout) if run.head else course("", lap.layout)
@@ -141,8 +142,9 @@ def caption(lap: Lap) -> str:
 def drivers(run: Run) -> list[tuple[str, str]]:
     """Who drove in this run: words for the legend and the style's name."""
     seen = {step.decision.driver for _, step in run.steps()}
-    known = [("novice", "novice"), ("human", "human"), *((name, f"{name} expert") for name in run.experts)]
-    known += [("mean", "mean of the experts"), ("shield", "the shield, instead of the novice")]
+    known: list[tuple[str, str]] = [(Driver.NOVICE, "novice"), (Driver.HUMAN, "human")]
+    known += [(name, f"{name} expert") for name in run.experts]
+    known += [(Driver.MEAN, "mean of the experts"), (Driver.SHIELD, "the shield, instead of the novice")]
     return [(words, plots.driver_class(name, run.experts)) for name, words in known if name in seen]
 
 
@@ -203,7 +205,7 @@ def pictures(run: Run) -> str:
         chosen = [calls[index * len(calls) // PICTURES] for index in range(PICTURES)]
     figures = []
     for lap, step in chosen:
-        colour = "var(--ink)" if step.decision.call == "feedback" else "var(--muted)"
+        colour = "var(--ink)" if step.decision.call == Call.FEEDBACK else "var(--muted)"
         when = f"{step.decision.stamp_s - lap.began_s:.1f} s"
         figures.append(
             f'<figure style="--key:{colour}"><img alt="camera at a call" src="{png(step.image or b"")}">'

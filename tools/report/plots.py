@@ -5,7 +5,7 @@ from collections import defaultdict
 from collections.abc import Sequence
 from itertools import pairwise
 
-from lira.hal.messages import Action
+from lira.hal.messages import Action, Call, Driver
 from lira.tools.report.course import Course
 from lira.tools.report.digest import Lap
 from lira.tools.report.svg import Point, bars, dots, drawing, number, path, polyline, text
@@ -14,14 +14,14 @@ MARGIN_M = 0.6
 PUT_BACK_M = 0.6  # farther than any robot here moves within one decision: it was put down anew
 WIDE = 4.0  # a top view with more width per height gets a row of its own, and scrolls
 BINS = 21
-CALLS = ("attention", "feedback")
+CALLS = (Call.ATTENTION, Call.FEEDBACK)
 
 
 def driver_class(driver: str, experts: Sequence[str]) -> str:
     """Style class of a driver: human, novice, mean, or an expert by its place among the experts."""
     if driver in experts:
         return f"e{experts.index(driver) % 4}"
-    return driver if driver in ("human", "novice", "mean") else "other"
+    return driver if driver in (Driver.HUMAN, Driver.NOVICE, Driver.MEAN) else "other"
 
 
 def top_view(lap: Lap, course: Course, experts: Sequence[str]) -> tuple[str, bool]:
@@ -53,7 +53,7 @@ def top_view(lap: Lap, course: Course, experts: Sequence[str]) -> tuple[str, boo
         path("".join(polyline(outline, closed=True) for outline in course.boxes), "box"),
     ]
     # The novice first: what the others did is rarer and goes on top.
-    for driver in sorted(marks, key=lambda name: (name != "novice", name)):
+    for driver in sorted(marks, key=lambda name: (name != Driver.NOVICE, name)):
         css = driver_class(driver, experts)
         parts.append(path("".join(lines[driver]), f"track s-{css}"))
         parts.append(path("".join(marks[driver]), f"steps s-{css}"))

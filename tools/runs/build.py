@@ -20,6 +20,7 @@ from lira.fusion.policies.ensemble import EnsembleNet
 from lira.fusion.policies.networks import FusionNet
 from lira.fusion.teaching.teacher import ScriptedTeacher, TeacherSettings
 from lira.hal.errors import ConfigError
+from lira.hal.messages import Driver
 from lira.hal.profile import RobotProfile
 from lira.sim_backend.foresight import Foresight
 from lira.sim_backend.world import World
@@ -46,7 +47,7 @@ def build_method(
     experts = (*(expert for _, expert in loaded), *(load_policy(each, profile, pair) for each in more))
     names = [expert.name for expert in experts]
     for name in names:
-        if names.count(name) > 1 or name in ("human", "novice", "mean", "none"):
+        if names.count(name) > 1 or name in tuple(Driver):
             raise ConfigError(f"more than one driver would be called '{name}'", "Give the expert another name.")
 
     def new_novice(*, ensemble: int = 0, trunks: Trunks | None = None, m: int | None = None) -> Novice:

@@ -11,7 +11,7 @@ from lira.fusion.methods.base import Method
 from lira.fusion.methods.shield import Shield, Shielded
 from lira.fusion.methods.syllabus import THESIS, Syllabus
 from lira.fusion.teaching.session import Drive, Session
-from lira.hal.messages import Episode
+from lira.hal.messages import Episode, Phase
 from lira.hal.port import Arena, Robot
 from lira.hal.profile import RobotProfile
 from lira.sim_backend.layout import build as build_layout
@@ -75,9 +75,9 @@ def run_course(
     """
     loop = ControlLoop(robot, truth=arena.state)
 
-    def alone(phase: str) -> Method:
+    def alone(phase: Phase) -> Method:
         driver = method.alone(phase)
-        return Shielded(driver, Shield(course.profile)) if course.shield and phase == "unseen" else driver
+        return Shielded(driver, Shield(course.profile)) if course.shield and phase == Phase.UNSEEN else driver
 
     session = Session(robot, arena, loop, journal, method if method.learns else None, alone)
     loop.arm()

@@ -25,14 +25,15 @@ from lira.fusion.teaching.curriculum import Curriculum, curriculum
 from lira.fusion.teaching.session import Same, Session
 from lira.fusion.teaching.teacher import ScriptedTeacher
 from lira.hal.errors import LiraError
-from lira.hal.messages import Action
+from lira.hal.messages import Action, Driver
 from lira.hal.profile import RobotProfile, load_profile
 from lira.sim_backend.catalogue import load_world
 from lira.sim_backend.foresight import Foresight, with_small_camera
+from lira.sim_backend.scenes.opening import quickest
 from lira.tools.runs.progress import telling
 from lira.tools.runs.simulated import simulate
 
-BLIND_PX = 4
+BLIND_HZ = 0.01
 
 
 def train_expert(kind: str, task: str, profile: RobotProfile, seed: int, path: Path, command: str) -> bool:
@@ -40,13 +41,13 @@ def train_expert(kind: str, task: str, profile: RobotProfile, seed: int, path: P
     torch.set_num_threads(1)
     course = curriculum(kind, task)
     world = load_world(course.world)
-    profile = blindfolded(profile) if kind == "lidar" else with_small_camera(profile)
     sees = next(row for row in modalities_of(profile) if row.sensor == kind)
+    profile = seeing_only(sees.name, with_small_camera(profile))
     network = ExpertNet(sees.name, sees.shape(profile), profile.features.filters, seed=seed)
     trainer = InlineTrainer(Learner(network, seed=seed, frozen_trunks=False))
     novice = NetworkNovice(network.driving(), trainer, LearningSettings())
     with (
-        simulate(world, profile, seed=seed, renderer="sketch") as robot,
+        simulate(world, profile, seed=seed, renderer=quickest(world)) as robot,
         closing(ScriptedTeacher(Foresight(profile, world), profile, course.teacher, seed)) as teacher,
     ):
         loop = ControlLoop(robot, truth=robot.arena.state)
@@ -89,15 +90,16 @@ def command(kind: str, task: str, profile: RobotProfile, seed: int) -> str:
     return f"lira train-expert {kind}{words} --profile {profile.name} --seed {seed}"
 
 
-def blindfolded(profile: RobotProfile) -> RobotProfile:
-    """Return the profile with a tiny picture: whoever sees with the lidar alone need not wait for a camera."""
-    camera = msgspec.structs.replace(profile.camera, width_px=BLIND_PX, height_px=BLIND_PX, encoding="png")
-    return msgspec.structs.replace(profile, camera=camera)
+def seeing_only(name: str, profile: RobotProfile) -> RobotProfile:
+    """Return the profile of a robot that learns from one feature: it waits for no pictures that it does not see."""
+    features = msgspec.structs.replace(profile.features, inputs=(name,))
+    camera = profile.camera if name == "image" else msgspec.structs.replace(profile.camera, rate_hz=BLIND_HZ)
+    return msgspec.structs.replace(profile, features=features, camera=camera)
 
 
 def measure_cruise(network: DrivingNet, profile: RobotProfile, course: Curriculum) -> Action:
     """Median action where the world is straight and empty: what the expert does with nothing to react to."""
-    alone = Alone("novice", network.act)
+    alone = Alone(Driver.NOVICE, network.act)
     with simulate(course.cruise_world, profile) as robot:
         loop = ControlLoop(robot)
         loop.arm()

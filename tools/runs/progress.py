@@ -11,13 +11,13 @@ import msgspec
 from lira.fusion.log.run_log import LapRecord, Record, ResultRecord, RunRecord, StepRecord
 from lira.hal.config import MALFORMED
 from lira.hal.errors import StorageError
-from lira.hal.messages import Decision
+from lira.hal.messages import Call, Decision, Phase
 from lira.tools.output.proven import proof_words
 
 Publish = Callable[[Decision], None]
 Say = Callable[[str], None]
 
-PHASES = {"train": "training lap", "prove": "proving run", "unseen": "unseen layout"}
+PHASES = {Phase.TRAIN: "training lap", Phase.PROVE: "proving run", Phase.UNSEEN: "unseen layout"}
 TTY_PERIOD_S = 0.1
 PLAIN_PERIOD_S = 5.0
 
@@ -77,9 +77,9 @@ class Progress:
             return ""
         decision = self._newest.decision
         labels = decision.labels
-        number = self._newest.layout if decision.phase == "unseen" else decision.lap
+        number = self._newest.layout if decision.phase == Phase.UNSEEN else decision.lap
         words = [f"{PHASES.get(decision.phase, decision.phase)} {number}", f"{decision.driver} drives"]
-        if decision.call != "none":
+        if decision.call != Call.NONE:
             words.append(f"{decision.call} call")
         words.append(
             f"labels {labels.demonstration} shown first, {labels.stored_human} human, {labels.stored_expert} expert"
@@ -93,7 +93,7 @@ class Progress:
 
 def lap_line(lap: LapRecord) -> str:
     """One finished lap."""
-    number = lap.layout if lap.phase == "unseen" else lap.lap
+    number = lap.layout if lap.phase == Phase.UNSEEN else lap.lap
     name = f"{PHASES.get(lap.phase, lap.phase)} {number}"
     words = f"{name:<16} {'passed' if lap.passed else 'failed'} {lap.duration_s:6.1f} s"
     words += f"  collisions {lap.collisions}, lost {lap.lost}"
@@ -101,7 +101,7 @@ def lap_line(lap: LapRecord) -> str:
         words += f", stops to ask {lap.stops}"
     if lap.shielded:
         words += f", turns changed by the shield {lap.shielded}"
-    if lap.phase == "train":
+    if lap.phase == Phase.TRAIN:
         words += f"  human labels {lap.human_labels}, interventions {lap.interventions}, calls {lap.calls},"
         words += f" buffer {lap.buffer}, training steps {lap.training_steps}"
     return words

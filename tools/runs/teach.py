@@ -13,6 +13,7 @@ from lira.fusion.methods.base import Expert, Method, Policy
 from lira.fusion.methods.context import Context
 from lira.fusion.methods.presets import Preset
 from lira.fusion.teaching.teacher import TEACHERS
+from lira.hal.messages import Phase
 from lira.hal.port import Arena, Robot
 from lira.hal.profile import RobotProfile
 from lira.sim_backend.world import World
@@ -114,4 +115,4 @@ def teach_on(
         journal = Journal(keep=keep, write=note, publish=publish)
         result = run_course(robot, arena, method, hand, journal, course, kept)
         note(result)
-        return Taught(method.alone("unseen"), result, laps)
+        return Taught(method.alone(Phase.UNSEEN), result, laps)

@@ -28,6 +28,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from lira.hal.errors import ConfigError, MissingExtraError
+from lira.hal.messages import Phase
 from lira.tools.options import add_expert, add_layout, add_protocol, add_seed, natural
 
 if TYPE_CHECKING:
@@ -61,8 +62,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add(
         "--renderer",
         choices=("sketch", "tiny", "egl"),
-        default="sketch",
-        help="what draws and measures the world, as in `lira twin` (default: %(default)s)",
+        help="what draws and measures the world, as in `lira twin` (default: sketch, if there is no mesh in it)",
     )
     add("--run", type=Path, metavar="DIR", help="folder of the run (default: runs/demo-<date-time>)")
 
@@ -74,12 +74,14 @@ def run(args: argparse.Namespace) -> int:
     from lira.fusion.methods.syllabus import THESIS, with_proof
     from lira.hal.profile import load_profile
     from lira.sim_backend.catalogue import load_world
+    from lira.sim_backend.scenes.opening import quickest
     from lira.tools.launch.launch import direct, wired
     from lira.tools.launch.processes import free_port, lira_command
 
     # What cannot work is refused before anything starts.
     world = args.world or ("lane" if args.wire else "line-obstacles")
-    task = task_of(load_world(world).name)
+    place = load_world(world)
+    task = task_of(place.name)
     robot = args.profile or TASKS[task].profile
     profile = load_profile(robot)
     for expert in experts_of(profile):
@@ -98,7 +100,7 @@ def run(args: argparse.Namespace) -> int:
     port = free_port()
     name, endpoint = f"demo_{port}", f"127.0.0.1:{port}"
     both = ["--layout", str(args.layout), "--seed", str(args.seed)]
-    twin = ["--world", world, "--profile", robot, "--renderer", args.renderer, *both]
+    twin = ["--world", world, "--profile", robot, "--renderer", args.renderer or quickest(place), *both]
     fusion = [*both, "--name", name, "--connect", endpoint, "--method", args.method, "--teacher", "scripted"]
     fusion += ["--run", str(folder), "--train-laps", str(args.laps), "--unseen", str(args.unseen)]
     fusion += ["--layouts", args.layouts, "--proof", args.proof]
@@ -192,7 +194,7 @@ def conclude(folder: Path) -> int:
 
     run = load_run(folder / RECORD)
     print(f"\n{format_table(COLUMNS, [lap_cells(lap) for lap in run.laps])}\n")
-    unseen = [lap.record for lap in run.phase("unseen") if lap.record is not None]
+    unseen = [lap.record for lap in run.phase(Phase.UNSEEN) if lap.record is not None]
     proven = run.result is not None and run.result.converged
     said = [unseen_words(unseen)]
     if run.result is not None:

@@ -22,6 +22,7 @@ exit status: 0 if it was done; check: 1 if something cannot be read (and was not
 import argparse
 import json
 from collections.abc import Callable
+from itertools import islice
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -64,13 +65,13 @@ def run(args: argparse.Namespace) -> int:
 
 def list_labels(args: argparse.Namespace) -> int:
     """Show all labels."""
-    from lira.fusion.log.label_log import read_demonstrations
+    from lira.fusion.log.label_edit import read_heads
     from lira.hal.errors import LiraError
     from lira.tools.labels.relearn import relearn
     from lira.tools.labels.words import list_rows, list_table
 
     path = args.file[0]
-    labels = list(read_demonstrations(path))
+    labels = read_heads(path)
     try:
         novice, learned = relearn(path)
         aside = {learned[each.number] for each in novice.set_aside()}
@@ -82,14 +83,13 @@ def list_labels(args: argparse.Namespace) -> int:
 
 def undo(args: argparse.Namespace) -> int:
     """Take labels back, or learn them again."""
-    from lira.fusion.log.label_edit import correct
-    from lira.fusion.log.label_log import read_demonstrations
+    from lira.fusion.log.label_edit import correct, read_heads
     from lira.tools.labels.choose import choose
     from lira.tools.labels.numbers import ranges
     from lira.tools.labels.relearn import rewrite
 
     path, again = args.file[0], args.what == "redo"
-    labels = list(read_demonstrations(path))
+    labels = read_heads(path)
     wanted = wanted_of(args)
     undone = [number for number, label in enumerate(labels) if label.undone]
     found = undone if again and wanted.nothing else choose(labels, wanted)
@@ -106,19 +106,20 @@ def undo(args: argparse.Namespace) -> int:
 
 def explain(args: argparse.Namespace) -> int:
     """Say which labels make an action."""
+    from lira.fusion.log.label_edit import read_heads
     from lira.fusion.log.label_log import read_demonstrations
     from lira.tools.labels.choose import nearest, one_of
     from lira.tools.labels.relearn import relearn
     from lira.tools.labels.words import pair, part_rows, part_table
 
     path = args.file[0]
-    labels = list(read_demonstrations(path))
+    labels = read_heads(path)
     if (args.time is None) is (not args.number):
         raise ConfigError("explain needs one label", "Give its --number, or a --time near it.")
     at = one_of(labels, wanted_of(args).numbers) if args.number else nearest(labels, args.time, args.run)
     novice, learned = relearn(path)
     label = labels[at]
-    seen = label.features
+    seen = next(islice(read_demonstrations(path), at, None)).features
     rows = part_rows(novice.explain(seen), learned, labels)
     action, alone, deviation = novice.act(seen), novice.alone(seen), novice.deviation(seen)
     where = f"label {at} (run {label.run}, lap {label.lap}, {label.stamp_s:.1f} s) says {pair(label.action)}"

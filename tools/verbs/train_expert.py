@@ -1,12 +1,12 @@
-"""Train one of a task's two single-sensor experts with HG-DAgger in the digital twin (thesis, appendices E.1, F.1).
+"""Train one of a task's single-sensor experts with HG-DAgger in the digital twin (thesis, appendices E.1, F.1).
 
 The scripted teacher drives whenever the young expert would err; only what the teacher drives is learned. Training
 ends when the expert alone passes all drives of its curriculum. The experts that come with the project were made by
 this command with its defaults.
 
-tasks: line (line-obstacles, race, eight-obstacles), eight, passage, garden, corridor. The lidar expert of the eight is
-the line's, that of the corridor the garden's. A pair of one's own for --experts DIR: --out DIR/camera.safetensors and
-DIR/lidar.safetensors.
+tasks: line (line-obstacles, race, eight-obstacles), eight, passage, garden, corridor, table-top. The lidar expert of
+the eight is the line's, that of the corridor the garden's; table-top has a depth expert, and both others of the line.
+Experts of one's own for --experts DIR: --out DIR/camera.safetensors, DIR/lidar.safetensors, one for each sensor.
 
 examples:
   lira train-expert camera

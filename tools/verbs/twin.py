@@ -33,6 +33,7 @@ if TYPE_CHECKING:
 LOOK_S = 0.2
 STATUS_S = 10.0
 DRAWN = {"sketch": "sketched without pybullet", "tiny": "drawn by pybullet", "egl": "drawn by pybullet with OpenGL"}
+LIDAR = "a2m8-1.29"
 ECHOES = 0.5  # of the directions ahead: with less the learner refuses the scan
 
 
@@ -52,6 +53,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         type=Path,
         metavar="DIR",
         help="be its devices, not a robot on the bus: lidar and base as serial ports in DIR, and a network camera",
+    )
+    add(
+        "--lidar",
+        metavar="UNIT",
+        help="with --wire: which RPLIDAR: a2m8-1.20 or a2m8-1.29 (by its firmware), a2m7, a2m12, a1, a3 "
+        f"(default: {LIDAR})",
     )
     add(
         "--arena",
@@ -77,6 +84,8 @@ def run(args: argparse.Namespace) -> int:
 
     if args.arena is not None and args.wire is None:
         raise ConfigError("--arena goes with --wire", "A twin that is a robot on the bus tells the truth there.")
+    if args.lidar is not None and args.wire is None:
+        raise ConfigError("--lidar goes with --wire", "A twin that is a robot on the bus has its profile's lidar.")
     if args.wire is not None:
         return run_wire(args, profile, world)
 
@@ -111,9 +120,13 @@ def run_wire(args: argparse.Namespace, profile: "RobotProfile", world: "World") 
     """Be the robot's devices until told to stop."""
     from lira.hal.bus.bus import Bus
     from lira.hal.server.server import stop_on_signal
+    from lira.sim_backend.emulators.rplidar_models import MODELS
     from lira.sim_backend.emulators.wired_twin import WiredTwin, sweeping
     from lira.sim_backend.twin import Twin
 
+    model = MODELS.get(args.lidar or LIDAR)
+    if model is None:
+        raise ConfigError(f"there is no lidar '{args.lidar}'", f"Known units: {', '.join(MODELS)}.")
     sweep = sweeping(profile)
     twin = Twin(sweep, world, layout=args.layout, seed=args.seed, realtime_factor=1.0, renderer=args.renderer)
     with stop_on_signal() as stop, ExitStack() as held:
@@ -121,7 +134,7 @@ def run_wire(args: argparse.Namespace, profile: "RobotProfile", world: "World") 
         if args.arena is not None:
             bus = Bus(args.name, listen=args.arena, insecure=args.insecure)
             held.callback(bus.close)
-        wired = WiredTwin(twin, args.wire)
+        wired = WiredTwin(twin, args.wire, model)
         try:
             _check_echoes(wired.echo_share(), profile, world)
             urls = ["--lidar", f"{args.wire}/rplidar", "--base", f"{args.wire}/core2", "--camera", wired.url]

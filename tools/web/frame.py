@@ -4,7 +4,7 @@ import math
 
 import msgspec
 
-from lira.hal.messages import Action, LaserScan
+from lira.hal.messages import Action, Driver, LaserScan
 from lira.tools.operator.view import STALE_S, View, battery_share
 from lira.tools.operator.voice import speak, verdict
 
@@ -72,9 +72,9 @@ def frame_of(view: View, *, time_s: float, seat: str, language: str) -> Frame:
     actors: list[Actor] = []
     if decision is not None:
         actors += [Actor(e.name, e.action, e.activation, e.active) for e in decision.experts]
-        actors.append(Actor("novice", decision.novice))
+        actors.append(Actor(Driver.NOVICE, decision.novice))
         if decision.human is not None:
-            actors.append(Actor("human", decision.human))
+            actors.append(Actor(Driver.HUMAN, decision.human))
         actors.append(Actor("drives", decision.executed))
     return Frame(
         time=time_s,

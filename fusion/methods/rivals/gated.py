@@ -13,9 +13,9 @@ box to see whether it asks. A hand that came uncalled goes when it likes.
 from abc import abstractmethod
 
 from lira.fusion.learning.novice import Novice
-from lira.fusion.methods.base import STAND, Call, Choice, Lesson, Method, Policy, Proposal
+from lira.fusion.methods.base import STAND, Choice, Lesson, Method, Policy, Proposal
 from lira.fusion.preprocess import Features
-from lira.hal.messages import Action
+from lira.hal.messages import Action, Call, Driver
 
 
 class RobotGated(Method):
@@ -48,12 +48,12 @@ class RobotGated(Method):
         """The novice's action, or to stand and call; before its first training step the human is asked to drive."""
         a_n = self.novice.act(features)
         if not self.novice.trained:
-            return Proposal(features, Choice("human", STAND, call=Call.FEEDBACK), a_n)
+            return Proposal(features, Choice(Driver.NOBODY, STAND, call=Call.FEEDBACK), a_n)
         if not self._called and not self._human_drove and self.hands_over(features, a_n):
             self._called = True
         if self._called:
-            return Proposal(features, Choice("novice", STAND, call=Call.FEEDBACK), a_n)
-        return Proposal(features, Choice("novice", a_n), a_n, relieves=self._relieves)
+            return Proposal(features, Choice(Driver.NOVICE, STAND, call=Call.FEEDBACK), a_n)
+        return Proposal(features, Choice(Driver.NOVICE, a_n), a_n, relieves=self._relieves)
 
     def learn(self, proposal: Proposal, human: Action | None) -> Lesson:
         """Store what the human did, and see whether that is enough."""
@@ -69,7 +69,7 @@ class RobotGated(Method):
 
     def policy(self, driver: str) -> Policy:
         """What would drive from here on: nobody, as long as the person is called."""
-        if driver == "novice" and self._called:
+        if driver == Driver.NOVICE and self._called:
             return lambda _: STAND
         return super().policy(driver)
 

@@ -3,15 +3,13 @@
 At test time the novice may doubt: `fusion/methods/doubt.py`.
 """
 
-from typing import Literal
-
 from lira.fusion.learning.novice import Novice
-from lira.fusion.methods.base import STAND, Call, Choice, Lesson, Method, Proposal
+from lira.fusion.methods.base import STAND, Choice, Lesson, Method, Proposal
 from lira.fusion.methods.context import Context, MethodSettings
 from lira.fusion.methods.doubt import DoubtLog, doubt_of
 from lira.fusion.methods.stop_and_ask import Doubtful
 from lira.fusion.preprocess import Features
-from lira.hal.messages import Action
+from lira.hal.messages import Action, Call, Driver, Phase
 
 
 class HgDaggerSettings(MethodSettings, frozen=True, tag="hg-dagger"):
@@ -20,7 +18,7 @@ class HgDaggerSettings(MethodSettings, frozen=True, tag="hg-dagger"):
     Without any there is no ensemble. With one the novice learns what it learns without.
     """
 
-    doubt: tuple[Literal["prove", "unseen"], ...] = ()
+    doubt: tuple[Phase, ...] = ()
     ensemble: int = 5
 
     def build(self, context: Context) -> Method:
@@ -52,8 +50,8 @@ class HgDagger(Method):
         """The novice's action; before its first training step it asks the human to drive."""
         a_n = self.novice.act(features)
         if not self.novice.trained:
-            return Proposal(features, Choice("human", STAND, call=Call.FEEDBACK), a_n)
-        return Proposal(features, Choice("novice", a_n), a_n)
+            return Proposal(features, Choice(Driver.NOBODY, STAND, call=Call.FEEDBACK), a_n)
+        return Proposal(features, Choice(Driver.NOVICE, a_n), a_n)
 
     def learn(self, proposal: Proposal, human: Action | None) -> Lesson:
         """Store the human's action, unless it is an idle frame that is to be left out."""
@@ -63,7 +61,7 @@ class HgDagger(Method):
             self.log.take_over(proposal.features)
         return super().learn(proposal, human)
 
-    def alone(self, phase: str) -> Method:
+    def alone(self, phase: Phase) -> Method:
         """The novice, which may doubt."""
         if self.log is not None and phase in self._doubt:
             return Doubtful(self.novice.alone, self.log.exceeds)
@@ -72,4 +70,4 @@ class HgDagger(Method):
     @property
     def calls_alone(self) -> bool:
         """Whether it doubts on unseen layouts."""
-        return self.log is not None and "unseen" in self._doubt
+        return self.log is not None and Phase.UNSEEN in self._doubt

@@ -16,9 +16,9 @@ from lira.fusion.learning.novice import Novice
 from lira.fusion.methods.base import Lesson, Method, Proposal
 from lira.fusion.methods.context import Context, MethodSettings
 from lira.fusion.methods.rivals.hg_dagger import HgDagger
-from lira.hal.messages import Action
+from lira.hal.messages import Action, Driver
 
-OWN = "novice"  # the source of such a label
+OWN = Driver.NOVICE  # the source of such a label
 
 
 class InterventionWeightedSettings(MethodSettings, frozen=True, tag="intervention-weighted"):

@@ -8,6 +8,7 @@ from lira.hal.messages import (
     Applied,
     BatteryState,
     Bool,
+    Call,
     Clock,
     CompressedImage,
     CourseState,
@@ -15,6 +16,7 @@ from lira.hal.messages import (
     DepthImage,
     DiagnosticArray,
     DiagnosticStatus,
+    Driver,
     ExpertView,
     Image,
     Imu,
@@ -25,6 +27,7 @@ from lira.hal.messages import (
     Odometry,
     OperatorAnswer,
     OperatorRequest,
+    Phase,
     Range,
     Reason,
     Request,
@@ -38,7 +41,19 @@ NAN, INF = math.nan, math.inf
 
 EXPERTS = (ExpertView("camera", (0.5, -1.0), 0.07, True), ExpertView("lidar", (1.0, 0.25), 0.0, False))
 DECISION = Decision(
-    7.25, 12, "camera", "attention", (0.5, -1.0), (0.25, 0.0), None, EXPERTS, 0.06, LabelCounts(1, 2, 3, 4, 5), 2, 3, 4
+    7.25,
+    12,
+    "camera",
+    Call.ATTENTION,
+    (0.5, -1.0),
+    (0.25, 0.0),
+    None,
+    EXPERTS,
+    0.06,
+    LabelCounts(1, 2, 3, 4, 5),
+    2,
+    3,
+    4,
 )
 MESSAGES: list[object] = [
     Twist(0.5, -1.5),
@@ -63,7 +78,8 @@ MESSAGES: list[object] = [
     CourseState(1.5, 1.0, 2.0, 3.0, 4.0, 5.0, NAN, NAN, INF),
     DECISION,
     Decision(
-        7.25, 12, "human", "none", (0.5, -1.0), (0.25, 0.0), (0.5, -1.0), (), 0.06, LabelCounts(), 0, 0, 0, "x", 3
+        *(7.25, 12, Driver.HUMAN, Call.NONE, (0.5, -1.0), (0.25, 0.0), (0.5, -1.0), (), 0.06),
+        *(LabelCounts(), 0, 0, 0, Phase.UNSEEN, 3),
     ),
     DiagnosticArray(1.5, (DiagnosticStatus(1, "a", "b", (("c", "d"),)), DiagnosticStatus(0, "e", "f"))),
     Bool(True),

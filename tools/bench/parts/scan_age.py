@@ -15,16 +15,18 @@ import numpy as np
 from lira.hal.bus.bus import Bus
 from lira.hal.bus.topics import SCAN
 from lira.hal.profile import load_profile
+from lira.robot.rplidar.decoders import DECODERS
 from lira.robot.rplidar.device import RPLidar
-from lira.robot.rplidar.points import PARSERS, Parser, Points
+from lira.robot.rplidar.points import Decoder, Points
+from lira.robot.rplidar.protocol import Answer
 from lira.robot.settings import LidarSettings
+from lira.sim_backend.emulators.rplidar_head import behind
 from lira.tools.bench import Row
-from lira.tools.bench.parts.devices import COUNT, FIRST_MM, MODES, Journal, devices
+from lira.tools.bench.parts.devices import COUNT, FIRST_MM, UNITS, Journal, devices
 from lira.tools.launch.processes import ChildProcess, free_port, lira_command
 
-RATE_HZ = 10.0  # of the emulated head
 SEAM_TURNS = 0.5  # behind the robot
-WAITING_PACKETS = 2  # the packet with the first sample of the next turn, and the one that gives it its angle
+MIDDLE_M = (FIRST_MM + COUNT / 2) / 1000
 ARRIVAL_S = 10.0
 POLL_S = 0.001
 QUICK = "[lidar]\nspin_up_s = 0.0\n[base]\nboot_s = 0.2\n"
@@ -70,15 +72,28 @@ def listen(robot: str, endpoint: str, seconds: float) -> list[tuple[float, float
 
 def ages(scans: list[tuple[float, float]], journal: Journal, mode: str) -> Row:
     """Ages of scans by the unit's own clockwork. Pure."""
-    sample_s, points = MODES[mode].sample_s, MODES[mode].points
+    unit = UNITS[mode]
+    scanned = unit.modes[-1]
+    decoder = DECODERS[Answer(scanned.answer)](scanned.sample_s)
+    since_s, rate_hz, turns = journal.course
+    # Where the head looks when its points pass the seam: the ultra stream leaves it to the driver how far they are
+    # behind. The turn is closed as far beyond that as angles may step back.
+    behind_rad = float(behind(np.array(MIDDLE_M))) if scanned.answer == Answer.ULTRA else 0.0
+    seam_turns = SEAM_TURNS + behind_rad / math.tau
+    closed_turns = seam_turns + decoder.back_rad / math.tau
     sent = np.array([count for _, count in journal.notes])
+
+    def first_after(turn: float) -> int:
+        """Number of the first sample that was taken from that turn of the head on."""
+        at_s = since_s + (turn - turns) / rate_hz
+        return math.ceil((at_s - journal.began_s) / scanned.sample_s)
+
     ages_ms, units_ms, robots_ms = [], [], []
     for stamp_s, published_s in scans:
         # The stamp is that of the turn's last sample, as near as the driver can tell: it says which turn this is.
-        turn = round(stamp_s * RATE_HZ - SEAM_TURNS)
-        after = math.ceil(((turn + SEAM_TURNS) / RATE_HZ - journal.began_s) / sample_s)
-        taken_s = journal.began_s + (after - 1) * sample_s
-        needed = (after // points + WAITING_PACKETS) * points
+        turn = round(turns + (stamp_s - since_s) * rate_hz - seam_turns)
+        taken_s = journal.began_s + (first_after(turn + seam_turns) - 1) * scanned.sample_s
+        needed = (first_after(turn + closed_turns) // scanned.points + 1) * scanned.points
         at = int(np.searchsorted(sent, needed))
         if at < len(sent):
             on_line_s = journal.notes[at][0]
@@ -93,16 +108,22 @@ def ages(scans: list[tuple[float, float]], journal: Journal, mode: str) -> Row:
 
 
 class Checked:
-    """A parser that knows which sample has to come next, and counts those that do not."""
+    """A decoder that knows which sample has to come next, and counts those that do not."""
 
-    def __init__(self, parse: Parser) -> None:
-        self._parse = parse
+    def __init__(self, decoder: Decoder) -> None:
+        self._decoder = decoder
+        self.size, self.back_rad = decoder.size, decoder.back_rad
         self._newest: int | None = None
         self.missing = 0
 
-    def __call__(self, buffer: bytes, usual_deg: float = math.inf) -> Points:
-        """Parse as the driver does."""
-        points = self._parse(buffer, usual_deg)
+    @property
+    def left(self) -> int:
+        """Bytes that wait for more."""
+        return self._decoder.left
+
+    def feed(self, data: bytes) -> Points:
+        """Decode as the driver does."""
+        points = self._decoder.feed(data)
         if len(points):
             number = np.rint(points.distance_m * 1000).astype(np.int64) - FIRST_MM
             before = number[:1] - 1 if self._newest is None else [self._newest]
@@ -113,10 +134,17 @@ class Checked:
 
 def endurance(mode: str, seconds: float) -> Row:
     """Read a unit for so long, and count every sample that is missing."""
-    parsers = {answer: Checked(parse) for answer, parse in PARSERS.items()}
+    made: list[Checked] = []
+
+    def make(sample_s: float) -> Decoder:
+        made.append(Checked(DECODERS[answer](sample_s)))
+        return made[-1]
+
+    answer = Answer(UNITS[mode].modes[-1].answer)
     with tempfile.TemporaryDirectory() as name, devices(Path(name), mode) as there:
         lidar = load_profile("rosbot2").lidar
-        driver = RPLidar(str(there.lidar), lidar, LidarSettings(spin_up_s=0.0), lambda _: None, parsers)
+        settings = LidarSettings(spin_up_s=0.0)
+        driver = RPLidar(str(there.lidar), lidar, settings, lambda _: None, {**DECODERS, answer: make})
         stop = threading.Event()
         timer = threading.Timer(seconds, stop.set)
         timer.start()
@@ -126,9 +154,9 @@ def endurance(mode: str, seconds: float) -> Row:
             timer.cancel()
         journal = there.stop()
     return {
-        "stream": f"lidar, {mode}, {seconds / 60:.3g} min at 115200 baud",
+        "stream": f"lidar, {mode}, {seconds / 60:.3g} min at {UNITS[mode].baud} baud",
         "points": driver.counts.points,
-        "missing": sum(parser.missing for parser in parsers.values()),
+        "missing": sum(decoder.missing for decoder in made),
         "lost_bytes": driver.counts.lost_bytes + journal.overflowed,
         "scans": driver.counts.turns,
     }

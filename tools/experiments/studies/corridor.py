@@ -5,6 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from lira.fusion.methods.presets import METHODS
+from lira.hal.messages import Phase
 from lira.tools.experiments.experiment import Experiment, Finding, Outcomes, Picture, Row, Table
 from lira.tools.experiments.measures import by_method, effort_row, method_rows
 from lira.tools.experiments.output.pictures import box_pictures
@@ -29,7 +30,7 @@ def trials(seeds: int) -> list[Trial]:
 def row(group: Sequence[Outcome]) -> Row:
     """Means over the seeds, as in the thesis. The first demonstration is the human's, too, and counted apart."""
     first = [outcome.after(1) for outcome in group]
-    unseen = [lap for outcome in group for lap in outcome.laps if lap.phase == "unseen"]
+    unseen = [lap for outcome in group for lap in outcome.laps if lap.phase == Phase.UNSEEN]
     return {
         "n": len(group),
         "buffer": mean([lap.buffer for lap in first]),

@@ -5,7 +5,8 @@ from functools import partial
 
 import numpy as np
 
-from lira.hal.messages import Action
+from lira.fusion.log.counts import DEMONSTRATION
+from lira.hal.messages import Action, Driver
 from lira.tools.experiments.experiment import Experiment, Finding, Outcomes, Picture, Row, Table
 from lira.tools.experiments.measures import by_method
 from lira.tools.experiments.methods import DRAWN, FUSED, HG_DAGGER
@@ -13,7 +14,7 @@ from lira.tools.experiments.studies.compare import trials
 from lira.tools.experiments.trial import Outcome
 from lira.tools.report.plots import BINS
 
-HUMAN = ("human", "demonstration")
+HUMAN = (Driver.HUMAN, DEMONSTRATION)
 FULL = 0.9  # from here on an action is full speed, or full steer
 STRAIGHT = 0.1  # up to here it goes straight on; between the two lies the mid-range
 EVEN = (0.35, 0.65)  # a share that is "almost equal"

@@ -11,6 +11,7 @@ from lira.fusion.log.recorder import Journal
 from lira.fusion.log.run_log import LapRecord
 from lira.fusion.methods.base import Alone
 from lira.fusion.methods.presets import METHODS
+from lira.hal.messages import Phase
 from lira.tools.experiments.experiment import Experiment, Finding, Outcomes, Picture, Row, Table
 from lira.tools.experiments.measures import by_method, median, method_rows
 from lira.tools.experiments.notes import Notes, Track
@@ -42,7 +43,7 @@ def alone(name: str, trial: Trial) -> tuple[LapRecord, Track]:
 
 def row(group: Sequence[Outcome]) -> Row:
     """How a preset's novices came by; medians over the seeds."""
-    taught = [[track for track in outcome.tracks if track.phase == "train"] for outcome in group]
+    taught = [[track for track in outcome.tracks if track.phase == Phase.TRAIN] for outcome in group]
     return {
         "n": len(group),
         "passed": sum(outcome.result.converged for outcome in group),
@@ -81,14 +82,14 @@ def side_m(track: Track) -> float | None:
 
 def final(group: Sequence[Outcome]) -> Track | None:
     """The first seed's last proving run."""
-    return next((track for track in reversed(group[0].tracks) if track.phase == "prove"), None)
+    return next((track for track in reversed(group[0].tracks) if track.phase == Phase.PROVE), None)
 
 
 def drives(outcomes: Outcomes) -> list[Row]:
     """Each expert alone, and the first seed's final novices."""
     shown = {f"{name} expert": alone(name, outcomes[0].trial) for name in experts_of(outcomes[0].trial.profile)}
     for method, group in by_method(outcomes).items():
-        proofs = [each for each in group[0].laps if each.phase == "prove"]
+        proofs = [each for each in group[0].laps if each.phase == Phase.PROVE]
         track = final(group)
         if proofs and track is not None:
             shown[f"novice, {method}"] = proofs[-1], track

@@ -5,6 +5,7 @@ from functools import partial
 
 import numpy as np
 
+from lira.hal.messages import Phase
 from lira.tools.experiments.experiment import Experiment, Finding, Outcomes, Picture, Row, Table
 from lira.tools.experiments.measures import by_method, known, method_rows, time_to_finish_s
 from lira.tools.experiments.methods import DRAWN
@@ -15,7 +16,7 @@ from lira.tools.experiments.trial import Outcome
 
 def final(outcome: Outcome) -> Track | None:
     """The last proving run; None if the novice never came to one."""
-    return next((track for track in reversed(outcome.tracks) if track.phase == "prove"), None)
+    return next((track for track in reversed(outcome.tracks) if track.phase == Phase.PROVE), None)
 
 
 def rows(outcomes: Outcomes) -> list[Row]:
@@ -25,7 +26,7 @@ def rows(outcomes: Outcomes) -> list[Row]:
 
 def row(group: Sequence[Outcome]) -> Row:
     """How the last proving runs went; medians over the seeds."""
-    laps = [next((lap for lap in reversed(o.laps) if lap.phase == "prove"), None) for o in group]
+    laps = [next((lap for lap in reversed(o.laps) if lap.phase == Phase.PROVE), None) for o in group]
     tracks = [track for track in map(final, group) if track is not None]
     speeds = [float(np.mean(track.speed_mm_s)) / 1000 for track in tracks]
     return {

@@ -20,14 +20,14 @@ STRAIGHT = 1e-9
 LONGEST = 8
 # Corners [n, 3], and four of them for each face [m, 4]: flat, and counter-clockwise from where it is seen.
 Indices = NDArray[np.intp]
-Mesh = tuple[Floats, Indices]
+Faces = tuple[Floats, Indices]
 # A box's corners are numbered 4 for the larger x, 2 for the larger y and 1 for the larger z, along its own axes.
 BOX_CORNERS = np.array([(x, y, z) for x in (-0.5, 0.5) for y in (-0.5, 0.5) for z in (0.0, 1.0)])
 # The end at the smaller x and at the larger, the side at the smaller y and at the larger, bottom and top.
 BOX_FACES = np.array([(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3)])
 
 
-def paint(layout: Layout) -> Iterator[tuple[int, Mesh]]:
+def paint(layout: Layout) -> Iterator[tuple[int, Faces]]:
     """Gray and faces of what is painted on a floor, each to be drawn over those before it."""
     layers = [(gray, list(alike)) for gray, alike in groupby(layout.marks, lambda mark: mark.gray)]
     for number, (gray, layer) in enumerate(layers):
@@ -37,7 +37,7 @@ def paint(layout: Layout) -> Iterator[tuple[int, Mesh]]:
         yield line.gray, ribbon_mesh(layout.curve, line)
 
 
-def ribbon_mesh(curve: Polyline, line: Line) -> Mesh:
+def ribbon_mesh(curve: Polyline, line: Line) -> Faces:
     """One face for each stretch of the line, facing up."""
     count = max(round(curve.length_m / PAINT_STEP_M), 1)
     edges = []
@@ -48,7 +48,7 @@ def ribbon_mesh(curve: Polyline, line: Line) -> Mesh:
     return np.array(edges), strip(count)
 
 
-def mark_mesh(mark: Mark, z_m: float) -> Mesh:
+def mark_mesh(mark: Mark, z_m: float) -> Faces:
     """One face for each stretch of a rectangle along its longer side, facing up."""
     lengthwise = mark.length_m >= mark.width_m
     long_m, short_m = (mark.length_m, mark.width_m) if lengthwise else (mark.width_m, mark.length_m)
@@ -85,7 +85,7 @@ def strip(count: int) -> Indices:
     return np.array([2, 3, 1, 0]) + 2 * np.arange(count)[:, None]
 
 
-def box_mesh(block: Block) -> Mesh:
+def box_mesh(block: Block) -> Faces:
     """Six faces in their place, facing out."""
     along, across, up = (BOX_CORNERS * (block.length_m, block.width_m, block.height_m)).T
     cos, sin = math.cos(block.yaw_rad), math.sin(block.yaw_rad)
@@ -93,14 +93,14 @@ def box_mesh(block: Block) -> Mesh:
     return np.stack([x, y, block.bottom_m + up], axis=-1), BOX_FACES
 
 
-def join(meshes: list[Mesh]) -> Mesh:
+def join(meshes: list[Faces]) -> Faces:
     """Make one mesh of several."""
     begun = np.cumsum([0, *(len(corners) for corners, _ in meshes)])
     faces = [own + first for first, (_, own) in zip(begun.tolist(), meshes, strict=False)]
     return np.concatenate([corners for corners, _ in meshes]), np.concatenate(faces)
 
 
-def obj_text(mesh: Mesh) -> str:
+def obj_text(mesh: Faces) -> str:
     """Write a mesh as a Wavefront file of triangles, with every normal up."""
     corners, faces = mesh
     lines = [f"v {x:.6f} {y:.6f} {z:.6f}" for x, y, z in corners]

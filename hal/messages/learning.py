@@ -1,0 +1,78 @@
+"""What is said about driving and learning: who drove, why, and what was learned."""
+
+from dataclasses import dataclass
+from enum import StrEnum
+
+from lira.hal.messages.values import Action
+
+
+class Driver(StrEnum):
+    """Who may drive a step, or give a label, beside the experts, which go by names of their own."""
+
+    HUMAN = "human"
+    NOVICE = "novice"
+    MEAN = "mean"  # of the experts that agree
+    SHIELD = "shield"  # a turn of the novice's that would have touched something, made clear
+    NOBODY = "none"  # it stands and waits for a person
+
+
+class Call(StrEnum):
+    """How the human is called: to look, or to answer."""
+
+    NONE = "none"
+    ATTENTION = "attention"
+    FEEDBACK = "feedback"
+
+
+class Phase(StrEnum):
+    """Where in a session a step or a lap belongs."""
+
+    TRAIN = "train"
+    PROVE = "prove"  # the novice alone, where it was taught
+    UNSEEN = "unseen"  # alone, where it was not
+
+
+@dataclass(frozen=True, slots=True)
+class ExpertView:
+    """One expert at one decision: its action, its activation A^i (eq. 1) and whether that made it active."""
+
+    name: str
+    action: Action
+    activation: float
+    active: bool
+
+
+@dataclass(frozen=True, slots=True)
+class LabelCounts:
+    """Labels by source; `given` is before the redundancy filter, `stored` after it."""
+
+    given_human: int = 0
+    given_expert: int = 0
+    stored_human: int = 0
+    stored_expert: int = 0
+    demonstration: int = 0  # the human's labels before the first training step, counted apart
+
+
+@dataclass(frozen=True, slots=True)
+class Decision:
+    """What was decided on one observation, by whom and why (`lira/decision`).
+
+    `driver` is a `Driver`, or the name of the expert or of whatever else drove; `executed` is its action, before any
+    slow-down; `phase` and `lap` say where in a session this step belongs.
+    """
+
+    stamp_s: float
+    observation: int
+    driver: str
+    call: Call
+    executed: Action
+    novice: Action
+    human: Action | None
+    experts: tuple[ExpertView, ...]
+    threshold: float
+    labels: LabelCounts
+    training_steps: int
+    interventions: int
+    calls: int  # rising edges of attention and feedback calls
+    phase: Phase = Phase.TRAIN
+    lap: int = 0

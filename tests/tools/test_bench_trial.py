@@ -1,0 +1,54 @@
+"""Where a trial's time goes: the meter, and that it is put on and taken off."""
+
+import msgspec
+import pytest
+
+from lira.fusion.teaching.teacher import ScriptedTeacher
+from lira.sim_backend.camera import PinholeCamera
+from lira.tools.bench import trial as bench
+from lira.tools.experiments.methods import USUAL
+from lira.tools.experiments.trial import Trial
+
+
+@pytest.fixture
+def clock(monkeypatch):
+    now = [0.0]
+    monkeypatch.setattr(bench.time, "perf_counter", lambda: now[0])
+    return now
+
+
+def test_what_is_called_within_is_not_counted_twice(clock):
+    def pass_time(seconds, then=lambda: None):
+        clock[0] += seconds
+        then()
+        clock[0] += seconds
+
+    meter = bench.Meter()
+    draw = meter.timed("render", lambda: pass_time(1.0))
+    teach = meter.timed("teacher", lambda: pass_time(2.0, draw))
+    pass_time(4.0, teach)
+    assert meter.stop() == {"rest": 8.0, "teacher": 4.0, "render": 2.0}
+
+
+def test_an_error_closes_its_share(clock):
+    def fail():
+        clock[0] += 1.0
+        raise OSError
+
+    meter = bench.Meter()
+    with pytest.raises(OSError):
+        meter.timed("rays", fail)()
+    clock[0] += 2.0
+    assert meter.stop() == {"rest": 2.0, "rays": 1.0}
+
+
+def test_a_trial_is_shared_out_and_left_as_it_was():
+    before = PinholeCamera.render, ScriptedTeacher.act
+    learning = msgspec.structs.replace(USUAL[0].learning, labels_per_step=1000)
+    method = msgspec.structs.replace(USUAL[0], learning=learning)
+    row = bench.measure(Trial(method, "lane", 0, laps=1, unseen=0))
+    assert (PinholeCamera.render, ScriptedTeacher.act) == before
+    assert row["method"] == method.name
+    assert sum(row[share] for share in bench.SHARES) == pytest.approx(1.0)
+    assert min(row[share] for share in bench.SHARES) > 0.0
+    assert row["seconds"] > 0.0

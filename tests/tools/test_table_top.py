@@ -1,0 +1,76 @@
+"""Three experts where only depth sees the danger: each alone fails, and a novice is taught by all of them."""
+
+import msgspec
+import pytest
+
+from lira.fusion.experts.files import experts_of
+from lira.fusion.learning.trainer import InlineTrainer
+from lira.fusion.methods.presets import METHODS
+from lira.fusion.policies.checkpoint import Checkpoint, load_checkpoint, save_checkpoint
+from lira.hal.profile import load_profile
+from lira.sim_backend.catalogue import load_world
+from lira.sim_backend.world import Box
+from lira.tools.runs.build import build_method
+from lira.tools.runs.script import drive
+from lira.tools.runs.simulated import simulate
+
+ROBOT = load_profile("thesis-sim-depth")
+TABLE_TOPS = load_world("table-top")
+NAMES = ("camera", "lidar", "depth")
+
+
+def with_one(*, hangs):
+    """The world's line with one table top, or one box, straight ahead."""
+    (kind,) = TABLE_TOPS.along
+    bottom_m, thickness_m = kind.tops_m if hangs else (0.0, kind.size_m)
+    box = Box(x_m=4.0, y_m=0.0, bottom_m=bottom_m, height_m=thickness_m, gray=kind.tops_gray if hangs else kind.gray)
+    return msgspec.structs.replace(TABLE_TOPS, along=(), box=(box,))
+
+
+def end_of(name, world, steps=60):
+    """Where an expert alone comes to in so many steps, or before it hits something."""
+    with simulate(world, ROBOT, renderer="sketch") as robot:
+        state = None
+        for step in drive(robot, f"{name}-expert", steps=steps, experts="table-top"):
+            state = step.state
+            if state.collided:
+                break
+    return state
+
+
+@pytest.mark.parametrize("name", ["camera", "lidar"])
+def test_who_sees_no_table_top_drives_into_it(name):
+    state = end_of(name, with_one(hangs=True))
+    assert state.collided
+    assert 3.0 < state.x_m < 4.0
+
+
+@pytest.mark.parametrize("hangs", [True, False])
+def test_the_depth_expert_drives_around_table_tops_and_boxes(hangs):
+    state = end_of("depth", with_one(hangs=hangs), steps=30)
+    assert not state.collided
+    assert state.x_m > 4.5
+
+
+def test_the_depth_expert_alone_sees_no_line():
+    state = end_of("depth", msgspec.structs.replace(TABLE_TOPS, along=()), steps=120)
+    assert state.lost
+
+
+@pytest.mark.parametrize("method", ["hold", "plus"])
+def test_a_novice_fuses_all_three_and_its_file_says_so(method, tmp_path):
+    assert experts_of(ROBOT) == NAMES
+    taught = build_method(METHODS[method], ROBOT, 0, InlineTrainer, "table-top")
+    assert tuple(expert.name for expert in taught.experts) == NAMES
+    with simulate("table-top", renderer="sketch") as robot:
+        steps = list(drive(robot, taught, steps=12))
+    step = steps[-1]
+    assert tuple(view.name for view in step.proposal.experts) == NAMES
+    assert set(step.proposal.features) == {"image", "scan", "depth"}
+    network = taught.novice.frozen()
+    path = tmp_path / "novice.safetensors"
+    save_checkpoint(path, network, Checkpoint.of(network, ROBOT.name, "a test", 0))
+    loaded, about = load_checkpoint(path)
+    assert about.features == {"image": (32, 32), "scan": (101,), "depth": (32, 32)}
+    assert loaded.act(step.proposal.features) == network.act(step.proposal.features)
+    taught.close()
