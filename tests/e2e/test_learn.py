@@ -20,7 +20,8 @@ from lira.hal.safety.governed import GovernedRobot
 from lira.sim_backend.catalogue import load_world
 from lira.sim_backend.twin import Twin
 from lira.tools.launch.processes import ChildProcess, lira_command
-from lira.tools.runs.build import build_method, lap, teacher
+from lira.tools.runs.build import build_method, teacher
+from lira.tools.runs.course import lap
 
 WORLD = """
 description = "A short straight line with one box on it"
