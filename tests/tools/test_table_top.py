@@ -4,9 +4,9 @@ import msgspec
 import pytest
 
 from lira.fusion.experts.files import experts_of
+from lira.fusion.inference.checkpoint import Checkpoint, load_checkpoint, save_checkpoint
 from lira.fusion.learning.trainer import InlineTrainer
 from lira.fusion.methods.presets import METHODS
-from lira.fusion.policies.checkpoint import Checkpoint, load_checkpoint, save_checkpoint
 from lira.hal.profile import load_profile
 from lira.sim_backend.catalogue import load_world
 from lira.sim_backend.world import Box
