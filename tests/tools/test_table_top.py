@@ -5,6 +5,7 @@ import pytest
 from lira.fusion.policies.checkpoint import Checkpoint, load_checkpoint, save_checkpoint
 
 from lira.fusion.experts.files import experts_of
+from lira.fusion.inference.checkpoint import Checkpoint, load_checkpoint, save_checkpoint
 from lira.fusion.learning.trainer import InlineTrainer
 from lira.fusion.methods.presets import METHODS
 from lira.hal.profile import load_profile
