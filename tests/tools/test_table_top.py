@@ -2,7 +2,6 @@
 
 import msgspec
 import pytest
-from lira.fusion.policies.checkpoint import Checkpoint, load_checkpoint, save_checkpoint
 
 from lira.fusion.experts.files import experts_of
 from lira.fusion.inference.checkpoint import Checkpoint, load_checkpoint, save_checkpoint
