@@ -108,7 +108,7 @@ def test_one_seed_gives_one_run(demos):
 
 def test_in_process_gives_the_same_decisions_as_over_the_bus(demos, world, one_thread, tmp_path):
     profile, floor = load_profile("thesis-sim"), load_world(str(world))
-    twin = Twin(profile, floor)
+    twin = Twin(profile, floor, renderer="sketch")  # as the demo's
     robot = GovernedRobot(twin)
     robot.open()
     method = build_method(METHODS["hold"], profile, 0, partial(ProcessTrainer, adopt_after_s=profile.period_s))
