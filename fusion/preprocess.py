@@ -120,7 +120,8 @@ def _image(image: Image | CompressedImage, profile: RobotProfile) -> tuple[Float
 
 
 def _depth(depth: DepthImage | CompressedImage, profile: RobotProfile) -> tuple[FloatArray, int]:
-    return near_depth(depth, profile.features.image_px, profile.features.max_range_m), 0
+    shape = profile.features
+    return near_depth(depth, shape.image_px, shape.max_depth_m or shape.max_range_m), 0
 
 
 # In the order in which networks see them and experts are asked.

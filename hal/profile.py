@@ -134,8 +134,9 @@ class Battery(Table, frozen=True):
 class Features(Table, frozen=True):
     """What the networks see: `bins` ranges over `fov_rad` ahead, clipped at `max_range_m`; square pictures.
 
-    `inputs` chooses which features there are, by the names of an observation's fields: `depth` is one more picture,
-    clipped likewise. `filters` is the width f of the trunks that see pictures (16 simulated, 32 real).
+    `inputs` chooses which features there are, by the names of an observation's fields. `depth` is one more picture,
+    clipped at `max_depth_m`, or as the ranges are. `filters` is the width f of the trunks that see pictures (16
+    simulated, 32 real).
     """
 
     fov_rad: Angle
@@ -144,6 +145,7 @@ class Features(Table, frozen=True):
     image_px: Annotated[int, Meta(ge=1, le=MAX_IMAGE_PX)]
     filters: Annotated[int, Meta(ge=1, le=MAX_FILTERS)]
     inputs: Annotated[tuple[str, ...], Meta(min_length=1)] = ("image", "scan")
+    max_depth_m: Positive | None = None
 
 
 class Control(Table, frozen=True):

@@ -36,6 +36,7 @@ VERBS = {
     "fusion": Verb(
         "lira.tools.verbs.fusion", "the learner: reads sensors, decides, drives, trains (LIRA-SPF, HG-DAgger)"
     ),
+    "drive": Verb("lira.tools.verbs.drive", "let a novice or an expert drive, also on the robot itself"),
     "train-expert": Verb("lira.tools.verbs.train_expert", "train the camera or the lidar expert"),
     "experiment": Verb("lira.tools.verbs.experiment", "repeat an experiment of the thesis, with statistics"),
     "new": Verb("lira.tools.verbs.new", "begin an expert, a method, a robot, a sensor or a world of your own"),
@@ -64,7 +65,8 @@ EXTRAS = {
     "aiohttp": "web",
     "segno": "web",
     "torch": "learn",
-    "safetensors": "learn",
+    "safetensors": "drive",
+    "threadpoolctl": "drive",
     "pygame": "console",
     "cryptography": "keys",
 }

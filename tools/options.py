@@ -2,6 +2,7 @@
 
 import argparse
 
+from lira.fusion.experts.tasks import TASKS
 from lira.hal.bus.endpoint import DEFAULT_ENDPOINT, DEFAULT_ROBOT
 
 DEFAULT = "(default: %(default)s)"
@@ -61,6 +62,34 @@ def add_seed(parser: argparse.ArgumentParser, what: str) -> None:
 def add_json(parser: argparse.ArgumentParser) -> None:
     """Declare `--json`, which `lira.tools.output.machine` heeds."""
     parser.add_argument("--json", metavar="FILE", help="write a JSON object to FILE (-: standard output)")
+
+
+def add_arena(parser: argparse.ArgumentParser) -> None:
+    """Declare `--arena`."""
+    parser.add_argument(
+        "--arena",
+        metavar="HOST:PORT",
+        help="of a robot on a twin's devices: where that twin tells the truth (its --arena)",
+    )
+
+
+def add_pair(parser: argparse.ArgumentParser) -> None:
+    """Declare `--experts`."""
+    parser.add_argument(
+        "--experts",
+        metavar="PAIR",
+        help=f"whose experts: a task ({', '.join(TASKS)}), TASK@SEED, or a folder with camera.safetensors and "
+        "lidar.safetensors (default: those of a twin's world; line)",
+    )
+
+
+def add_shield(parser: argparse.ArgumentParser, who: str) -> None:
+    """Declare `--shield`; `who` drives behind it."""
+    parser.add_argument(
+        "--shield",
+        action="store_true",
+        help=f"{who}: a turn that would touch what the lidar sees gives way to the nearest one that does not",
+    )
 
 
 def add_expert(parser: argparse.ArgumentParser) -> None:

@@ -11,12 +11,12 @@ import numpy as np
 from lira.fusion.experts.files import EXPERTS as NAMES
 from lira.fusion.experts.files import expert_path
 from lira.fusion.experts.tasks import DEFAULT
+from lira.fusion.inference.checkpoint import Checkpoint, load_checkpoint
+from lira.fusion.inference.kernel_net import KernelNet
+from lira.fusion.inference.networks import DrivingNet
 from lira.fusion.methods.base import Alone, Expert, Method, Policy
-from lira.fusion.methods.doubt import Doubtful
 from lira.fusion.methods.shield import Shield, Shielded
-from lira.fusion.policies.checkpoint import Checkpoint, load_checkpoint
-from lira.fusion.policies.kernel_net import KernelNet
-from lira.fusion.policies.networks import Network
+from lira.fusion.methods.stop_and_ask import Doubtful
 from lira.fusion.preprocess import Features, Shape, shapes_of
 from lira.hal.errors import ConfigError, PluginError
 from lira.hal.messages import Action
@@ -24,7 +24,7 @@ from lira.hal.plugins import EXPERTS
 from lira.hal.profile import RobotProfile
 
 
-def load_network(name_or_path: str, profile: RobotProfile, pair: str = DEFAULT) -> tuple[Network, Checkpoint]:
+def load_network(name_or_path: str, profile: RobotProfile, pair: str = DEFAULT) -> tuple[DrivingNet, Checkpoint]:
     """Load a policy and check that it fits the robot. Raises `ConfigError` or `StorageError`."""
     path = expert_path(name_or_path, profile, pair)
     network, checkpoint = load_checkpoint(path)
@@ -42,7 +42,7 @@ def _sizes(shapes: Mapping[str, Shape]) -> str:
     return ", ".join(f"{name} {'x'.join(map(str, shape))}" for name, shape in shapes.items())
 
 
-def as_expert(name: str, network: Network, cruise: Action | None) -> Expert:
+def as_expert(name: str, network: DrivingNet, cruise: Action | None) -> Expert:
     """Wrap a network as a black box."""
     return Expert(name, network.act) if cruise is None else Expert(name, network.act, cruise)
 
@@ -77,7 +77,7 @@ def load_alone(
     return Shielded(alone, Shield(profile)) if shield else alone
 
 
-def _load(given: str | Expert | Policy, profile: RobotProfile, pair: str) -> tuple[Expert, Network | None]:
+def _load(given: str | Expert | Policy, profile: RobotProfile, pair: str) -> tuple[Expert, DrivingNet | None]:
     """Load a policy, and the network that it is; None for a black box."""
     if not isinstance(given, str):
         names = (getattr(given, "name", None), getattr(given, "__name__", None), type(given).__name__)

@@ -1,16 +1,16 @@
-"""The novice of `fusion/kernel.py`: it learns from each label at once, and says how sure it is."""
+"""The novice of `policies/kernel.py`: it learns from each label at once, and says how sure it is."""
 
 import math
+from dataclasses import replace
 
 import torch
 from torch import Tensor
 
+from lira.fusion.inference.kernel_net import NEVER, KernelNet
 from lira.fusion.learning.labels import Label, mirror
 from lira.fusion.learning.learned_policy import Contradiction, Part
 from lira.fusion.learning.novice import LearningSettings, Novice
 from lira.fusion.policies.kernel import ANGULAR, KernelRidge, KernelSettings
-from lira.fusion.policies.kernel_net import NEVER, KernelNet
-from lira.fusion.policies.networks import batch_of_one
 from lira.fusion.preprocess import Features
 from lira.hal.messages import Action, Driver
 
@@ -23,12 +23,13 @@ class KernelNovice(Novice):
     ) -> None:
         super().__init__(learning)
         self._network = network
+        sees = network.architecture
         self._settings = settings
         self._mirrored = mirrored
         self._given: list[tuple[str, Action]] = []  # who gave each label, and what it says
         self._group = 0
         self.limit = math.inf  # the largest deviation of its turn in the proving runs since the last label
-        self.ridge = KernelRidge(dict(zip(network.shapes, network.sizes, strict=True)), settings)
+        self.ridge = KernelRidge(dict(zip(sees.shapes, sees.trunk_sizes, strict=True)), settings)
 
     def act(self, features: Features) -> Action:
         """m(x)."""
@@ -104,12 +105,8 @@ class KernelNovice(Novice):
             "gain": torch.tensor([self.ridge.gain]).numpy(),
             "limit": torch.tensor([min(self.limit, NEVER)]).numpy(),
         }
-        network = KernelNet(self._network.shapes, self._network.filters, examples=int(used.sum()))
-        network.load_weights(weights)
-        return network
+        return KernelNet(replace(self._network.architecture, examples=int(used.sum())), weights)
 
     def _x(self, features: Features) -> Tensor:
         """x [size] of one state."""
-        with torch.inference_mode():
-            x = self._network.features(batch_of_one(features))
-        return x[0].clone()
+        return torch.from_numpy(self._network.see(features))

@@ -8,7 +8,7 @@ from lira.fusion.preprocess import Features
 from lira.hal.messages import Action
 
 if TYPE_CHECKING:
-    from lira.fusion.policies.networks import Network
+    from lira.fusion.inference.networks import DrivingNet
 
 
 @dataclass(frozen=True, slots=True)
@@ -88,7 +88,7 @@ class LearnedPolicy:
         """Which labels make what it does here, the largest part first; none, unless it can tell."""
         return []
 
-    def frozen(self) -> "Network | None":
+    def frozen(self) -> "DrivingNet | None":
         """Return a copy of the policy as it drives alone, to be saved; None if it is no network."""
         return None
 

@@ -7,14 +7,15 @@ from typing import Any
 import numpy as np
 import torch
 from numpy.typing import NDArray
-from torch import Tensor
+from torch import Tensor, nn
 
+from lira.fusion.inference.architecture import Weights
+from lira.fusion.learning.heads import Heads
 from lira.fusion.learning.label_store import FileRows, Rows
 from lira.fusion.learning.labels import Label as Label
 from lira.fusion.learning.labels import mirror
 from lira.fusion.policies.ensemble import EnsembleNet
 from lira.fusion.policies.networks import Inputs, Network, PictureTrunk, ScanTrunk, batch_of_one
-from lira.fusion.policies.networks import Weights as Weights
 from lira.fusion.preprocess import MODALITIES
 
 RESIDENT_BYTES = 128 * 2**20  # of inputs in memory; 10,000 labels with frozen trunks, 92,000 without
@@ -78,17 +79,50 @@ class Learner:
         if not len(self):
             raise ValueError("there is nothing to learn from yet")
         picks = torch.from_numpy(self._random.integers(len(self), size=(self._updates, self._batch)))
-        return sum(self._update(pick) for pick in picks) / self._updates
+        losses = [self._update(pick) for pick in picks]
+        return float(torch.stack(losses).mean())
 
     def weights(self) -> Weights:
         """Copy the network's weights."""
+        if "_heads" in self.__dict__:  # it has trained
+            self._heads.put_back(*self._layers())
+            if self._members:
+                self._doubters.put_back(*self._member_layers())
         return self._network.weights()
+
+    # Made by whoever trains, which may be another process than the one that gave the network.
+
+    @cached_property
+    def _heads(self) -> Heads:
+        """The layers behind the trunks; those of `_network` are not up to date."""
+        return Heads(*self._layers())
+
+    @cached_property
+    def _doubters(self) -> Heads:
+        """Those of the ensemble's members."""
+        return Heads(*self._member_layers())
+
+    def _layers(self) -> tuple[list[Tensor], list[Tensor]]:
+        """Weights [1, in, out] and biases [1, 1, out] of the network's layers behind the trunks, in its memory."""
+        layers = [getattr(self._network, name) for name in self._network.architecture.layers]
+        return [layer.weight.data.T[None] for layer in layers], [layer.bias.data[None, None] for layer in layers]
+
+    def _member_layers(self) -> tuple[list[Tensor], list[Tensor]]:
+        """The same of an ensemble's members [members, in, out] and [members, 1, out]."""
+        assert isinstance(self._network, EnsembleNet)
+        return [each.data for each in self._network.member_weights], [each.data for each in self._network.member_biases]
+
+    @cached_property
+    def _trunks(self) -> list[nn.Parameter]:
+        """What trains of the trunks: nothing of frozen ones."""
+        trunks = self._network.trunks.values()
+        return [each for trunk in trunks for each in trunk.parameters() if each.requires_grad]
 
     @cached_property
     def _adam(self) -> torch.optim.Adam:
-        """Made by whoever trains: PyTorch's optimisers load for seconds and take 80 MB."""
-        trained = [parameter for parameter in self._network.parameters() if parameter.requires_grad]
-        return torch.optim.Adam(trained, lr=self._learning_rate, fused=True)
+        """PyTorch's optimisers load for seconds and take 80 MB."""
+        heads = [self._heads.flat, *([self._doubters.flat] if self._members else [])]
+        return torch.optim.Adam([*heads, *self._trunks], lr=self._learning_rate, fused=True)
 
     def _keep(self, label: Label) -> None:
         kept = {name: MODALITIES[name].keep(label.features[name]) for name in self._network.shapes}
@@ -111,29 +145,29 @@ class Learner:
         if (self._resident + 1) * sum(store.row_bytes for store in self._inputs.values()) > self._resident_bytes:
             self._spilled = FileRows(kept)
 
-    def _update(self, pick: Tensor) -> float:
+    def _update(self, pick: Tensor) -> Tensor:
+        """Go one step down the mean squared error of some labels, and return it."""
         features = self._features(pick)
-        targets = self._targets.rows[pick]
-        error = (self._network.head(features) - targets[:, :2]).square() * targets[:, 2:3]
-        loss = error.mean()
-        self._adam.zero_grad()
-        (loss + self._members_loss(features, targets)).backward()  # type: ignore[no-untyped-call]
+        seen, targets = features.detach(), self._targets.rows.index_select(0, pick)
+        actions, weights = targets[:, :2], targets[:, 2:3]
+        losses, slope = self._heads.descend(seen, actions, weights[None])
+        if self._trunks:
+            for parameter in self._trunks:
+                parameter.grad = None
+            features.backward(slope[0] @ self._heads.weights[0][0].T)  # type: ignore[no-untyped-call]
+        if self._members:
+            times = targets[:, 3:].T.unsqueeze(2)
+            self._doubters.descend(seen, actions, times * weights)
         self._adam.step()
-        return loss.item()
-
-    def _members_loss(self, features: Tensor, targets: Tensor) -> Tensor | float:
-        if not isinstance(self._network, EnsembleNet):
-            return 0.0
-        times = targets[:, 3:].T.unsqueeze(2) * targets[:, 2:3]
-        error = (self._network.member_heads(features) - targets[:, :2]).square() * times
-        return error.mean(dim=(1, 2)).sum()
+        return losses[0]
 
     def _features(self, pick: Tensor) -> Tensor:
         """Trunk output of some labels [n, size], from wherever they are kept."""
+        if self._spilled is None:
+            kept = {name: store.rows.index_select(0, pick) for name, store in self._inputs.items()}
+            return kept[TRUNKS] if self._frozen_trunks else self._network.features(_scaled(kept))
         near = pick < self._resident
         kept = {name: store.rows[pick[near]] for name, store in self._inputs.items()}
-        if self._spilled is None or bool(near.all()):
-            return kept[TRUNKS] if self._frozen_trunks else self._network.features(_scaled(kept))
         far = self._spilled.read((pick[~near] - self._resident).tolist())
         if not self._frozen_trunks:
             both = {name: torch.cat([array, far[name]]) for name, array in kept.items()}

@@ -3,17 +3,16 @@
 The other novice there is learns from every label at once: `fusion/kernel_novice.py`.
 """
 
-import copy
 import math
 import time
 from abc import ABC, abstractmethod
 from typing import Literal, Protocol
 
-from lira.fusion.learning.labels import is_rest
+from lira.fusion.inference.architecture import Weights
+from lira.fusion.inference.build import alone
+from lira.fusion.inference.networks import DrivingNet
+from lira.fusion.learning.labels import Label, is_rest
 from lira.fusion.learning.learned_policy import LearnedPolicy
-from lira.fusion.learning.learner import Label, Weights
-from lira.fusion.policies.ensemble import EnsembleNet
-from lira.fusion.policies.networks import Network
 from lira.fusion.preprocess import Features
 from lira.hal.config import Table
 from lira.hal.messages import Action, Driver
@@ -88,7 +87,7 @@ class Novice(LearnedPolicy, ABC):
         """Take in a label: a new one, or one that an earlier session stored."""
 
     @abstractmethod
-    def frozen(self) -> Network:
+    def frozen(self) -> DrivingNet:
         """Return a copy of the policy as it drives alone, to be saved."""
 
     def learn(self, features: Features, action: Action, source: str, a_n: Action) -> bool:
@@ -115,7 +114,7 @@ class Novice(LearnedPolicy, ABC):
 class NetworkNovice(Novice):
     """A network, trained beside the loop. Weights are swapped between two steps."""
 
-    def __init__(self, network: Network, trainer: Trainer, settings: LearningSettings) -> None:
+    def __init__(self, network: DrivingNet, trainer: Trainer, settings: LearningSettings) -> None:
         super().__init__(settings)
         self.network = network
         self._trainer = trainer
@@ -131,10 +130,9 @@ class NetworkNovice(Novice):
         self.stored += 1
         self._fresh += 1
 
-    def frozen(self) -> Network:
+    def frozen(self) -> DrivingNet:
         """Copy the network, without an ensemble that only doubts."""
-        network = copy.deepcopy(self.network)
-        return network.novice() if isinstance(network, EnsembleNet) else network
+        return alone(self.network)
 
     def update(self, now_s: float) -> None:
         """Adopt weights that are ready; begin a training step if one is due: the remainder of m labels is carried."""

@@ -17,8 +17,10 @@ from multiprocessing.context import SpawnContext
 import numpy as np
 import torch
 
-from lira.fusion.learning.learner import Label, Learner
-from lira.fusion.policies.networks import FusionNet, Weights
+from lira.fusion.inference.architecture import Weights
+from lira.fusion.learning.labels import Label
+from lira.fusion.learning.learner import Learner
+from lira.fusion.policies.networks import FusionNet
 from lira.fusion.preprocess import Features
 from lira.hal.errors import LiraError
 from lira.hal.messages import FloatArray

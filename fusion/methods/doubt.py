@@ -1,4 +1,4 @@
-"""The robot that stops and asks where it doubts, and HG-DAgger's doubt: how far an ensemble disagrees.
+"""HG-DAgger's doubt: how far an ensemble disagrees.
 
 d(O) = ||diag Cov_b[pi_b(O)]||_2 over the ensemble's policies pi_b. The threshold tau is the mean of the last quarter
 of the doubts that were logged when the human took over (Kelly et al., 2019).
@@ -9,13 +9,12 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
+from lira.fusion.inference.ensemble import DrivingEnsemble
 from lira.fusion.learning.kernel_novice import KernelNovice
 from lira.fusion.learning.novice import NetworkNovice, Novice
-from lira.fusion.methods.base import STAND, Choice, Method, Policy, Proposal
-from lira.fusion.policies.ensemble import EnsembleNet
 from lira.fusion.preprocess import Features
 from lira.hal.errors import ConfigError
-from lira.hal.messages import Call, Driver, FloatArray
+from lira.hal.messages import FloatArray
 
 Doubt = Callable[[Features], float]
 """d(O), in squared units of the action."""
@@ -43,7 +42,7 @@ def doubt_of(novice: Novice) -> Doubt:
     if isinstance(novice, KernelNovice):
         return lambda features: math.hypot(*(each**2 for each in novice.deviation(features)))
     network = novice.network if isinstance(novice, NetworkNovice) else None
-    if not isinstance(network, EnsembleNet):
+    if not isinstance(network, DrivingEnsemble):
         raise ConfigError("this novice cannot doubt", "Give it an ensemble, or the kernel novice.")
     return lambda features: doubt(network.opinions(features))
 
@@ -67,22 +66,3 @@ class DoubtLog:
     def exceeds(self, features: Features) -> bool:
         """Whether the doubt is above tau."""
         return self.doubt(features) > self.threshold
-
-
-class Doubtful(Method):
-    """A novice alone; where it `doubts` too much it stands and asks. Nothing is learned from the answer."""
-
-    def __init__(self, novice: Policy, doubts: Callable[[Features], bool]) -> None:
-        self._novice = novice
-        self._doubts = doubts
-
-    def propose(self, features: Features) -> Proposal:
-        """The novice's action, or to stand and call for feedback."""
-        a_n = self._novice(features)
-        if self._doubts(features):
-            return Proposal(features, Choice(Driver.NOVICE, STAND, call=Call.FEEDBACK), a_n)
-        return Proposal(features, Choice(Driver.NOVICE, a_n), a_n)
-
-    def policy(self, driver: str) -> Policy:
-        """What would drive from here on, standing included."""
-        return dict[str, Policy]({Driver.NOVICE: lambda features: self.propose(features).choice.action})[driver]

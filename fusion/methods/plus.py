@@ -17,8 +17,8 @@ from dataclasses import replace
 from lira.fusion.learning.novice import Novice
 from lira.fusion.methods.base import Choice, Expert, Lesson, Method, Policy, Proposal, Settled
 from lira.fusion.methods.context import Context, MethodSettings
-from lira.fusion.methods.doubt import Doubtful
 from lira.fusion.methods.lira import LiraSettings, LiraSpf, choose
+from lira.fusion.methods.stop_and_ask import Doubtful
 from lira.fusion.preprocess import Features
 from lira.hal.messages import Action, Call, Driver, Phase
 
@@ -115,7 +115,7 @@ class LiraPlus(LiraSpf):
 
     def policy(self, driver: str) -> Policy:
         """The policy behind a driver's name: a novice that practises drives as it does alone."""
-        return self.novice.alone if driver == "novice" and self._practises else super().policy(driver)
+        return self.novice.alone if driver == Driver.NOVICE and self._practises else super().policy(driver)
 
     @property
     def _practises(self) -> bool:

@@ -3,14 +3,15 @@
 The ensemble is there to disagree, not to drive: the novice's own layers learn exactly what they learn without it.
 """
 
+from dataclasses import replace
+
 import numpy as np
 import torch
 from torch import Tensor, nn
 from torch.nn.functional import leaky_relu
 
-from lira.fusion.policies.networks import FUSION_HIDDEN, SLOPE, FusionNet, batch_of_one
-from lira.fusion.preprocess import Features
-from lira.hal.messages import FloatArray
+from lira.fusion.inference.architecture import FUSION_HIDDEN, Architecture
+from lira.fusion.policies.networks import SLOPE, FusionNet
 
 
 class EnsembleNet(FusionNet):
@@ -31,11 +32,10 @@ class EnsembleNet(FusionNet):
         sizes = (FUSION_HIDDEN, FUSION_HIDDEN, 2)
         self.member_biases = nn.ParameterList(torch.zeros(members, 1, size) for size in sizes)
 
-    def novice(self) -> FusionNet:
-        """Return a copy of the novice without its ensemble."""
-        alone = FusionNet(self.shapes, self.filters)
-        alone.load_state_dict({name: value for name, value in self.state_dict().items() if name in alone.state_dict()})
-        return alone
+    @property
+    def architecture(self) -> Architecture:
+        """The novice's, and so many members."""
+        return replace(super().architecture, members=self.members)
 
     def member_heads(self, features: Tensor) -> Tensor:
         """Trunk output [n, size] -> what each member would do [members, n, 2]. No gradient reaches the trunks."""
@@ -45,8 +45,3 @@ class EnsembleNet(FusionNet):
             hidden = torch.baddbmm(bias, hidden, weight)
             hidden = torch.tanh(hidden) if k == last else leaky_relu(hidden, SLOPE)
         return hidden
-
-    def opinions(self, seen: Features) -> FloatArray:
-        """What each member would do, float32 [members, 2]."""
-        with torch.inference_mode():
-            return self.member_heads(self.features(batch_of_one(seen)))[:, 0].numpy()

@@ -1,30 +1,38 @@
-"""The networks of Appendix B: one for each sensor's expert, and the fusion of all that a novice sees.
+"""The networks of Appendix B as they train: one for each sensor's expert, and the fusion of all that a novice sees.
 
 Leaky ReLU with slope 0.3, valid padding, stride 1, Glorot initialisation, tanh outputs. Every network is asked with all
-features by name, and looks at its own, so that whoever drives or trains one need not know which they are.
+features by name, and looks at its own, so that whoever trains one need not know which they are. What drives is in
+`inference/networks.py`, without torch.
 """
 
 from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
 from typing import Any, Self
 
-import numpy as np
 import torch
 from numpy.typing import NDArray
 from torch import Tensor, nn
 from torch.nn.functional import leaky_relu, max_pool2d
 
+from lira.fusion.inference.architecture import (
+    FUSION,
+    FUSION_HIDDEN,
+    HIDDEN,
+    Architecture,
+    Weighted,
+    Weights,
+    check,
+    trunk_weights,
+)
+from lira.fusion.inference.build import driving
+from lira.fusion.inference.layers import SLOPE as _SLOPE
+from lira.fusion.inference.networks import DrivingNet
 from lira.fusion.preprocess import MODALITIES, Features, Shape
-from lira.hal.messages import Action
 
-SLOPE = 0.3
-HIDDEN = 64  # units of a scan trunk's layer
-FUSION_HIDDEN = 128
+SLOPE = float(_SLOPE)
 
 Inputs = Mapping[str, Tensor]
 """A batch of features by name, float32 [n, *shape]."""
-Weights = dict[str, NDArray[np.float32]]
-"""All parameters of a network by name, detached from it."""
 
 
 class PictureTrunk(nn.Module):
@@ -85,7 +93,7 @@ def new_trunk(name: str, shape: Shape, filters: int) -> Trunk:
 class Network(nn.Module, ABC):
     """A policy: `features` is what its trunks make of what is seen, `head` turns that into actions [n, 2] in [-1, 1].
 
-    `kind` is the sensor whose expert it is, "fusion" or "kernel".
+    `kind` is the sensor whose expert it is, or "fusion".
     """
 
     kind: str
@@ -106,9 +114,13 @@ class Network(nn.Module, ABC):
         return max(trunk.filters for trunk in self.trunks.values())
 
     @property
-    def examples(self) -> int:
-        """How many labels it drives by; 0 for one that has only been trained on them."""
-        return 0
+    def architecture(self) -> Architecture:
+        """What it is made of."""
+        return Architecture(self.kind, self.shapes, self.filters)
+
+    def driving(self) -> DrivingNet:
+        """Return what drives with a copy of its weights."""
+        return driving(self.architecture, self.weights())
 
     def features(self, inputs: Inputs) -> Tensor:
         """What the trunks make of a batch [n, size], one behind the other."""
@@ -122,27 +134,14 @@ class Network(nn.Module, ABC):
         """A batch of features -> actions [n, 2]."""
         return self.head(self.features(inputs))
 
-    def act(self, seen: Features) -> Action:
-        """Return the action for one step."""
-        with torch.inference_mode():
-            linear, angular = self(batch_of_one(seen))[0].tolist()
-        return linear, angular
-
     def weights(self) -> Weights:
         """Copy the weights out."""
         return {name: tensor.numpy(force=True).copy() for name, tensor in self.state_dict().items()}
 
     def load_weights(self, weights: Mapping[str, NDArray[Any]]) -> None:
         """Put weights in, all or none. Raises `ValueError` where they do not fit or are not finite."""
+        check(self.architecture.weights, weights)
         own: dict[str, Tensor] = self.state_dict()
-        if own.keys() != weights.keys():
-            raise ValueError(f"weights of another network: {', '.join(sorted(own.keys() ^ weights.keys()))}")
-        for name, tensor in own.items():
-            new = weights[name]
-            if new.shape != tuple(tensor.shape) or new.dtype != np.float32:
-                raise ValueError(f"{name} is {new.dtype} {new.shape} instead of float32 {tuple(tensor.shape)}")
-            if not np.isfinite(new).all():
-                raise ValueError(f"{name} is not finite")
         for name, tensor in own.items():
             tensor.copy_(torch.from_numpy(weights[name]))
 
@@ -183,17 +182,16 @@ class SeeingNet(Network):
         """One for each feature."""
         return {name: getattr(self, MODALITIES[name].sensor) for name in self._sees}
 
-    def see_as(self, experts: Sequence[ExpertNet]) -> Self:
+    def see_as(self, experts: Sequence[Weighted]) -> Self:
         """Take copies of the experts' trunks."""
-        for expert in experts:
-            self.trunks[expert.sees].load_state_dict(expert.trunk.state_dict())
+        self.load_weights(self.weights() | trunk_weights(experts))
         return self
 
 
 class FusionNet(SeeingNet):
     """The novice: the trunks, concatenated -> 128 -> 128 -> 2."""
 
-    kind = "fusion"
+    kind = FUSION
 
     def __init__(self, shapes: Mapping[str, Shape], filters: int, *, seed: int = 0) -> None:
         super().__init__(shapes, filters)
@@ -203,19 +201,19 @@ class FusionNet(SeeingNet):
         initialise(self, seed)
 
     @classmethod
-    def from_experts(cls, experts: Sequence[ExpertNet], *, seed: int = 0) -> "FusionNet":
-        """Build a novice whose trunks are copies of the experts' trunks. The learner can keep them frozen."""
-        return cls(*seen_by(experts), seed=seed).see_as(experts)
+    def from_experts(cls, experts: Sequence[Weighted], *, frozen: bool = True, seed: int = 0) -> "FusionNet":
+        """Build a novice that sees what some experts see together, if `frozen` with copies of their trunks.
+
+        The learner can keep these as they are.
+        """
+        what = Architecture.novice(FUSION, experts)
+        network = cls(what.shapes, what.filters, seed=seed)
+        return network.see_as(experts) if frozen else network
 
     def head(self, features: Tensor) -> Tensor:
         """128 -> 128 -> 2: the fusion layers, all that trains when the trunks are frozen."""
         hidden = leaky_relu(self.fc2(leaky_relu(self.fc1(features), SLOPE)), SLOPE)
         return torch.tanh(self.out(hidden))
-
-
-def seen_by(experts: Sequence[ExpertNet]) -> tuple[dict[str, Shape], int]:
-    """The features that some experts see together, by name, and the width of those who see pictures."""
-    return {expert.sees: expert.trunk.shape for expert in experts}, max(expert.filters for expert in experts)
 
 
 def batch_of_one(seen: Features) -> dict[str, Tensor]:

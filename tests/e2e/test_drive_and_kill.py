@@ -70,7 +70,7 @@ def witness(address, twin):
 
 
 def fusion(address, log):
-    command = lira_command("fusion", "--policy", "camera-expert", "--name", address[0], "--connect", address[1])
+    command = lira_command("drive", "camera-expert", "--name", address[0], "--connect", address[1])
     return ChildProcess("the driver", command, log)
 
 

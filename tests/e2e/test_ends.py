@@ -209,7 +209,7 @@ def test_a_signal_ends_it(stage, verb, number):
 
 CLIENTS = {
     "person": (["fusion", "--method", "lira", "--run", "{folder}/run"], "learns on"),
-    "policy": (["fusion", "--policy", "camera-expert"], "drives '"),
+    "policy": (["drive", "camera-expert"], "drives '"),
     "console": (["console"], "console shows"),
     "joystick": (["joystick"], "joystick drives"),
 }

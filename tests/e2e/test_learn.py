@@ -20,7 +20,8 @@ from lira.hal.safety.governed import GovernedRobot
 from lira.sim_backend.catalogue import load_world
 from lira.sim_backend.twin import Twin
 from lira.tools.launch.processes import ChildProcess, lira_command
-from lira.tools.runs.build import build_method, lap, teacher
+from lira.tools.runs.build import build_method, teacher
+from lira.tools.runs.course import lap
 
 WORLD = """
 description = "A short straight line with one box on it"
@@ -107,7 +108,7 @@ def test_one_seed_gives_one_run(demos):
 
 def test_in_process_gives_the_same_decisions_as_over_the_bus(demos, world, one_thread, tmp_path):
     profile, floor = load_profile("thesis-sim"), load_world(str(world))
-    twin = Twin(profile, floor)
+    twin = Twin(profile, floor, renderer="sketch")  # as the demo's
     robot = GovernedRobot(twin)
     robot.open()
     method = build_method(METHODS["hold"], profile, 0, partial(ProcessTrainer, adopt_after_s=profile.period_s))

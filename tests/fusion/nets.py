@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from lira.fusion.inference.kernel_net import KernelNet
 from lira.fusion.policies.networks import ExpertNet, FusionNet
 from lira.fusion.preprocess import Features
 
@@ -20,6 +21,11 @@ def lidar_net(bins, *, seed=0):
 
 def fusion_net(bins, filters, *, px=32, seed=0):
     return FusionNet(shapes(bins, px), filters, seed=seed)
+
+
+def kernel_net(bins, filters, *, px=32, seed=0):
+    """A novice of plus that was taught nothing."""
+    return KernelNet.from_experts([camera_net(filters, px=px, seed=seed), lidar_net(bins, seed=seed)])
 
 
 def noise(bins, seed=0):

@@ -8,10 +8,12 @@ import torch
 from nets import camera_net, lidar_net
 from taught import FEATURES, make_novice
 
+from lira.fusion.inference.build import alone
 from lira.fusion.learning.learner import Label, Learner
 from lira.fusion.methods.base import STAND
-from lira.fusion.methods.doubt import Doubtful, DoubtLog, doubt, threshold
+from lira.fusion.methods.doubt import DoubtLog, doubt, threshold
 from lira.fusion.methods.rivals.hg_dagger import HgDagger
+from lira.fusion.methods.stop_and_ask import Doubtful
 from lira.fusion.policies.ensemble import EnsembleNet
 from lira.fusion.policies.networks import FusionNet
 from lira.fusion.preprocess import Features
@@ -98,7 +100,7 @@ def test_the_ensemble_learns_too_and_changes_nothing_for_the_novice(frozen):
     plain = FusionNet.from_experts([camera_net(16, seed=4), lidar_net(101, seed=5)], seed=1)
     ensemble = EnsembleNet(plain, members=3, seed=7)
     seen = next(labels(1)).features
-    before = ensemble.opinions(seen)
+    before = ensemble.driving().opinions(seen)
     assert before.shape == (3, 2)
     assert doubt(before) > 0
     learners = [Learner(each, seed=2, frozen_trunks=frozen) for each in (plain, ensemble)]
@@ -111,7 +113,7 @@ def test_the_ensemble_learns_too_and_changes_nothing_for_the_novice(frozen):
         network.load_weights(learner.weights())
     for name, value in plain.weights().items():
         np.testing.assert_array_equal(ensemble.weights()[name], value, err_msg=name)
-        np.testing.assert_array_equal(ensemble.novice().weights()[name], value, err_msg=name)
-    after = ensemble.opinions(seen)
+        np.testing.assert_array_equal(alone(ensemble.driving()).weights()[name], value, err_msg=name)
+    after = ensemble.driving().opinions(seen)
     assert np.median(np.abs(after[:, 1] + 0.5)) < 0.15 < np.median(np.abs(before[:, 1] + 0.5))  # they have learned
     assert len({tuple(row) for row in after.tolist()}) == 3  # and none the same

@@ -1,17 +1,16 @@
 import numpy as np
 import pytest
-from nets import camera_net, fusion_net, lidar_net
+from nets import camera_net, fusion_net, kernel_net, lidar_net
 
 from lira.fusion.experts.files import experts_of, folder_of
 from lira.fusion.experts.load import as_expert, load_alone, load_network, load_policy
 from lira.fusion.experts.tasks import DEFAULT, TASKS, task_of
+from lira.fusion.inference.checkpoint import Checkpoint, save_checkpoint
 from lira.fusion.methods.base import Alone
-from lira.fusion.methods.doubt import Doubtful
 from lira.fusion.methods.shield import Shielded
-from lira.fusion.policies.checkpoint import Checkpoint, save_checkpoint
-from lira.fusion.policies.kernel_net import KernelNet
+from lira.fusion.methods.stop_and_ask import Doubtful
 from lira.fusion.policies.networks import ExpertNet
-from lira.fusion.preprocess import Features, shapes_of
+from lira.fusion.preprocess import Features
 from lira.hal.errors import ConfigError, StorageError
 from lira.hal.profile import load_profile
 from lira.sim_backend.catalogue import load_world
@@ -125,7 +124,7 @@ def test_a_missing_file_is_one_clear_error(tmp_path):
 
 
 def test_an_expert_is_a_black_box_that_sees_both_sensors():
-    network = fusion_net(101, 16, seed=3)
+    network = fusion_net(101, 16, seed=3).driving()
     assert as_expert("both", network, None).act(FEATURES) == network.act(FEATURES)
     assert as_expert("both", network, None).cruise == (1.0, 0.0)
 
@@ -137,7 +136,7 @@ def test_a_policy_that_cannot_tell_what_it_knows_cannot_ask():
 
 
 def test_a_novice_of_plus_can(tmp_path):
-    path = save(tmp_path / "novice.safetensors", KernelNet(shapes_of(SIM), SIM.features.filters), SIM.name)
+    path = save(tmp_path / "novice.safetensors", kernel_net(SIM.features.bins, SIM.features.filters), SIM.name)
     assert isinstance(load_alone(path, SIM, ask=True), Doubtful)
     assert isinstance(load_alone(path, SIM), Alone)
 

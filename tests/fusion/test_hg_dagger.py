@@ -35,7 +35,7 @@ class Trainer:
 @pytest.fixture
 def method():
     network = camera_net(16)
-    return HgDagger(NetworkNovice(network, Trainer(network), LearningSettings(labels_per_step=2)))
+    return HgDagger(NetworkNovice(network.driving(), Trainer(network), LearningSettings(labels_per_step=2)))
 
 
 def train(method):

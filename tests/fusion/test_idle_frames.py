@@ -38,7 +38,7 @@ def make_lira(novice):
 @pytest.mark.parametrize(("settings", "kept"), [({}, [REST, CREEP]), ({"idle_frames": "skip"}, [CREEP])])
 def test_an_idle_frame_is_a_label_unless_the_settings_skip_it(make, settings, kept):
     collector = Collector()
-    method = make(NetworkNovice(camera_net(16), collector, LearningSettings(filter_human=False, **settings)))
+    method = make(NetworkNovice(camera_net(16).driving(), collector, LearningSettings(filter_human=False, **settings)))
     lessons = [method.learn(method.propose(FEATURES), action) for action in (REST, CREEP)]
     assert collector.actions == kept
     assert [lesson.choice.label for lesson in lessons if lesson.stored] == kept
@@ -47,5 +47,5 @@ def test_an_idle_frame_is_a_label_unless_the_settings_skip_it(make, settings, ke
 
 @pytest.mark.parametrize("make", [make_lira, HgDagger], ids=["lira", "hg-dagger"])
 def test_a_frame_that_is_left_out_is_not_given_either(make):
-    method = make(NetworkNovice(camera_net(16), Collector(), LearningSettings(idle_frames="skip")))
+    method = make(NetworkNovice(camera_net(16).driving(), Collector(), LearningSettings(idle_frames="skip")))
     assert method.learn(method.propose(FEATURES), REST).choice.label is None

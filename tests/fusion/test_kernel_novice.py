@@ -6,13 +6,12 @@ import numpy as np
 import pytest
 from nets import camera_net, lidar_net
 
+from lira.fusion.inference.checkpoint import Checkpoint, load_checkpoint, save_checkpoint
+from lira.fusion.inference.kernel_net import KernelNet
 from lira.fusion.learning.kernel_novice import KernelNovice
 from lira.fusion.learning.labels import Label, mirror
 from lira.fusion.learning.novice import LearningSettings
-from lira.fusion.policies.checkpoint import Checkpoint, load_checkpoint, save_checkpoint
 from lira.fusion.policies.kernel import KernelSettings
-from lira.fusion.policies.kernel_net import KernelNet
-from lira.fusion.policies.networks import batch_of_one
 from lira.fusion.preprocess import Features
 from lira.hal.errors import StorageError
 
@@ -117,8 +116,7 @@ def test_frozen_it_drives_as_the_novice_alone_and_doubts_as_it_does():
     network = learner.frozen()
     for each in map(seen, (0, 1, 77)):
         assert network.act(each) == pytest.approx(learner.alone(each), abs=1e-4)
-        deviation = network.deviation(batch_of_one(each))[0]
-        assert deviation.tolist() == pytest.approx(learner.deviation(each), abs=1e-4)
+        assert network.deviation(each) == pytest.approx(learner.deviation(each), abs=1e-4)
 
 
 def test_alone_it_turns_more_than_while_it_is_taught():

@@ -36,7 +36,7 @@ def labels(count: int, seed: int = 0) -> list[Label]:
 
 
 def error(network, made: list[Label]) -> float:
-    return float(np.mean([np.subtract(network.act(one.features), one.action) ** 2 for one in made]))
+    return float(np.mean([np.subtract(network.driving().act(one.features), one.action) ** 2 for one in made]))
 
 
 def trained(network, *, seed=1, steps=2, frozen=False, made=None, **settings) -> Learner:
@@ -62,7 +62,7 @@ def test_training_learns_and_leaves_the_given_network_alone(frozen):
 def test_experts_learn_from_their_own_sensor(network, k):
     fresh = labels(50, seed=9)
     network.load_weights(trained(network, steps=4).weights())
-    wrong = [abs(network.act(one.features)[k] - one.action[k]) for one in fresh]
+    wrong = [abs(network.driving().act(one.features)[k] - one.action[k]) for one in fresh]
     assert np.mean(wrong) < 0.15
 
 
@@ -115,7 +115,9 @@ def test_full_training_stays_close_to_plain_float32(monkeypatch):
     networks = fusion_net(*SIZES), fusion_net(*SIZES)
     for network, weights in zip(networks, (fast, exact), strict=True):
         network.load_weights(weights)
-    apart = [np.subtract(networks[0].act(one.features), networks[1].act(one.features)) for one in fresh]
+    apart = [
+        np.subtract(networks[0].driving().act(one.features), networks[1].driving().act(one.features)) for one in fresh
+    ]
     assert np.abs(apart).mean() < 0.05
 
 

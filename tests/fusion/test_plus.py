@@ -14,7 +14,7 @@ from lira.hal.messages import Call
 
 PERIOD_S = 0.2
 BINS = 101
-NETWORK = fusion_net(BINS, 16, seed=3)
+NETWORK = fusion_net(BINS, 16, seed=3).driving()
 CRUISE, LEFT, RIGHT = (1.0, 0.0), (1.0, 0.8), (1.0, -0.8)
 BARE = PlusSettings(prefill=0, reserve_s=0.0, handover_s=0.0, sure=None)
 

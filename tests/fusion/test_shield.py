@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from lira.fusion.methods.base import STAND, Alone, Method
-from lira.fusion.methods.doubt import Doubtful
 from lira.fusion.methods.shield import HORIZON_S, MARGINS_M, STEPS, Shield, Shielded, arcs
+from lira.fusion.methods.stop_and_ask import Doubtful
 from lira.fusion.preprocess import Features
 from lira.hal.errors import ConfigError
 from lira.hal.messages import Call

@@ -63,11 +63,13 @@ def board(tmp_path):
 @pytest.fixture
 def driver(board, tmp_path):
     process = subprocess.Popen([sys.executable, "-c", DRIVER, str(tmp_path / "core2")])
-    board.wait_for(GO)
-    time.sleep(0.3)
-    yield process
-    process.kill()
-    process.wait()
+    try:
+        board.wait_for(GO)
+        time.sleep(0.3)
+        yield process
+    finally:
+        process.kill()
+        process.wait()
 
 
 @pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGSTOP])

@@ -210,7 +210,7 @@ def test_the_verb_serves_it_for_lira_fusion_and_says_what_is_missing(tmp_path, d
             else:
                 server.wait_ready("a Twist carries no time", 10.0)
                 server.wait_ready("one link to the bridge", 10.0)
-            policy = ["fusion", "--policy", "lidar-expert", "--name", name, "--connect", near]
+            policy = ["drive", "lidar-expert", "--name", name, "--connect", near]
             with ChildProcess("the policy", lira_command(*policy), tmp_path / "lira.fusion.log") as fusion:
                 fusion.wait_ready("drives", 60.0)
                 wait_for(lambda: not robot.commands[-1][1].endswith(ZERO), 20.0)

@@ -72,6 +72,19 @@ def test_many_poses_at_once_are_as_one_by_one(eight):
         assert [float(v) for v in alone] == [float(v[index]) for v in together]
 
 
+@pytest.mark.parametrize("world", ["eight", "race", "garden"])
+def test_one_place_is_projected_as_many_are_to_the_bit(world):
+    """The referee's short way: on the curve, beside it, beyond its ends, laps on, and with a hint that is off."""
+    curve = build(load_world(world)).curve
+    rng = np.random.default_rng(0)
+    for at_m in rng.uniform(-5.0, 2.5 * curve.length_m, 300).tolist():
+        inside = at_m if curve.closed else min(max(at_m, -5.0), curve.length_m + 5.0)
+        x, y, _ = curve.pose(inside, rng.uniform(-2.0, 2.0))
+        hint_m = inside + rng.uniform(-1.0, 1.0)
+        progress, lateral, _ = curve.project(np.array([x, y]), hint_m)
+        assert curve.project_one(x, y, hint_m) == (float(progress), float(lateral))
+
+
 def test_distance_to_a_turned_box():
     block = Block(1.0, 2.0, math.pi / 4, 2.0, 1.0, 0.5, 0)
     obstacles = Obstacles.of((block,))

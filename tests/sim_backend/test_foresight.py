@@ -1,4 +1,7 @@
-"""The imagined robot's small picture is what the networks would see of the large one."""
+"""Looking ahead: the imagined robot's small picture, and what is not looked at."""
+
+import subprocess
+import sys
 
 import numpy as np
 import pytest
@@ -6,7 +9,7 @@ import pytest
 from lira.fusion.modalities.image import gray_image
 from lira.hal.messages import Episode
 from lira.hal.profile import load_profile
-from lira.sim_backend.foresight import with_small_camera
+from lira.sim_backend.foresight import Foresight, with_small_camera
 from lira.sim_backend.twin import Twin
 
 
@@ -29,3 +32,34 @@ def test_a_small_picture_looks_like_the_one_it_stands_for(world):
 def test_a_camera_that_is_small_already_is_left_alone():
     profile = load_profile("thesis-sim")
     assert with_small_camera(profile) is profile
+
+
+@pytest.mark.parametrize("turn", [-0.6, 0.0, 0.6])
+def test_a_look_ahead_that_ends_is_the_beginning_of_a_whole_one(turn):
+    """What the teacher does not look at any more changes nothing of what it has seen."""
+    profile = load_profile("thesis-sim")
+    twin, foresight = Twin(profile, "line-obstacles", layout=3), Foresight(profile, "line-obstacles", 3)
+    ended = 0
+    for start_m in np.arange(0.0, 40.0, 1.5).tolist():
+        twin.reset(Episode(3, start_m=start_m))
+        state = twin.state()
+        whole = foresight.rollout(state, lambda _: (1.0, turn), 8, 0.2)
+        short = foresight.rollout(state, lambda _: (1.0, turn), 8, 0.2, lambda each: each.clearance_m < 0.3)
+        near = [number for number, each in enumerate(whole) if each.clearance_m < 0.3]
+        expected = whole[: near[0] + 1] if near else whole
+        assert len(short) == len(expected)
+        for one, other in zip(short, expected, strict=True):  # but for the rounding of a clock that goes on
+            assert (one.x_m, one.y_m, one.clearance_m) == pytest.approx((other.x_m, other.y_m, other.clearance_m))
+            assert (one.collided, one.lost) == (other.collided, other.lost)
+        ended += len(short) < len(whole)
+    assert ended
+    foresight.close()
+
+
+def test_nothing_of_pybullet_is_loaded_for_a_sketch():
+    code = (
+        "import sys; from lira.hal.profile import load_profile; from lira.sim_backend.twin import Twin\n"
+        "t = Twin(load_profile('thesis-sim'), 'race', renderer='sketch'); t.open(); t.read(); t.close()\n"
+        "sys.exit('pybullet' in sys.modules)"
+    )
+    assert subprocess.run([sys.executable, "-c", code], check=False, timeout=60).returncode == 0

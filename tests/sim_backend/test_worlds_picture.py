@@ -37,7 +37,6 @@ def test_the_verb_writes_a_picture(tmp_path, capsys):
         (["nosuch", "--picture", "a.png"], "unknown world 'nosuch'"),
         (["line", "--picture", "a.jpg"], "a.jpg is no .png file"),
         (["line", "--picture", "no/such/folder/a.png"], "cannot write no/such/folder/a.png: No such file"),
-        (["line", "--layout", "-1", "--picture", "a.png"], "layout -1 is negative"),
     ],
 )
 def test_a_mistake_is_one_line_and_its_remedy(tmp_path, monkeypatch, capsys, words, complaint):

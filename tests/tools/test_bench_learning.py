@@ -7,7 +7,7 @@ from short_trials import write_world
 from lira.fusion.control import ControlLoop
 from lira.fusion.modalities.image import gray_image
 from lira.hal.messages import CompressedImage
-from lira.tools.bench import log, preprocess, step, train
+from lira.tools.bench import decide, log, preprocess, step, train
 
 
 def test_preprocess_compares_two_ways_to_the_same_image(monkeypatch):
@@ -25,6 +25,16 @@ def test_preprocess_compares_two_ways_to_the_same_image(monkeypatch):
     assert rows[0]["input"] == "jpeg 640x480"
     assert rows[0]["speedup"] > 0
     assert max(compared) < 5 / 255
+
+
+def test_decide_has_a_row_per_network_and_kind_of_trunks(monkeypatch):
+    for name, value in {"RUNS": 1, "DECISIONS": 2}.items():
+        monkeypatch.setattr(decide, name, value)
+    rows = decide.run()
+    assert [(row["filters"], row["trunks"]) for row in rows] == [
+        (f, each) for f in (16, 32) for each in ("shared", "own")
+    ]
+    assert all(row["ms"] > 0 and row["torch_ms"] > 0 and row["speedup"] > 0 for row in rows)
 
 
 def test_train_has_a_row_per_network_and_kind_of_training(monkeypatch):

@@ -45,6 +45,14 @@ def test_help_lists_every_verb_and_needs_only_the_standard_library():
     assert all(name in done.stdout for name in cli.VERBS)
 
 
+@pytest.mark.parametrize("verb", cli.VERBS)
+def test_every_verb_explains_itself(verb, capsys):
+    with pytest.raises(SystemExit) as end:
+        cli.main([verb, "--help"])
+    assert end.value.code == 0
+    assert f"usage: lira {verb}" in capsys.readouterr().out
+
+
 def test_no_words_is_help(capsys):
     assert cli.main([]) == 0
     assert "lira demo" in capsys.readouterr().out

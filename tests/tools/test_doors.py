@@ -64,23 +64,33 @@ def lab(tmp_path, monkeypatch):
 
 
 @pytest.fixture
-def fusion(lab, capsys):
-    """Run `lira fusion` on a twin in lockstep; return the exit status, what is printed and what is complained of."""
+def lira_on_twin(lab, capsys):
+    """Run a verb on a twin in lockstep; return the exit status, what is printed and what is complained of."""
 
     def run(*words):
         address, name = f"127.0.0.1:{free_port()}", f"t{uuid.uuid4().hex}"
         words_of_twin = ("--lockstep", "--name", name, "--listen", address, "--world", write_world(lab))
         with ChildProcess("twin", lira_command("twin", *words_of_twin), lab / "twin.log") as twin:
             twin.wait_ready("serves world", 60.0)
-            status = cli.main(["fusion", "--name", name, "--connect", address, *words])
+            status = cli.main([*words, "--name", name, "--connect", address])
         return status, *capsys.readouterr()
 
     return run
 
 
-def test_a_method_and_an_expert_of_ones_own_are_taught_over_the_bus(fusion, lab):
-    words = ("--method", "doorlab:Gated", "--expert", "doorlab:wall", "--train-laps", "1", "--run", str(lab / "run"))
-    status, out, err = fusion(*words, "--teacher", "perfect")
+def test_a_method_and_an_expert_of_ones_own_are_taught_over_the_bus(lira_on_twin, lab):
+    words = (
+        "fusion",
+        "--method",
+        "doorlab:Gated",
+        "--expert",
+        "doorlab:wall",
+        "--train-laps",
+        "1",
+        "--run",
+        str(lab / "run"),
+    )
+    status, out, err = lira_on_twin(*words, "--teacher", "perfect")
     assert err == ""
     assert status in (0, 1)  # one lap may be too few
     assert out.startswith("doorlab:Gated (doorlab:Gated) on short")
@@ -90,11 +100,11 @@ def test_a_method_and_an_expert_of_ones_own_are_taught_over_the_bus(fusion, lab)
     assert steps[-1].decision.training_steps > 0 or "there is no novice yet" in out
 
 
-def test_a_policy_of_ones_own_drives_and_its_fault_is_its_own(fusion, lab):
-    status, _, err = fusion("--policy", "doorlab:crash", "--unseen", "1")
+def test_a_policy_of_ones_own_drives_and_its_fault_is_its_own(lira_on_twin, lab):
+    status, _, err = lira_on_twin("drive", "doorlab:crash", "--unseen", "1")
     assert status == 2
     what, remedy = err.splitlines()
-    assert what == "lira fusion: the policy 'doorlab:crash' failed: ZeroDivisionError: division by zero"
+    assert what == "lira drive: the policy 'doorlab:crash' failed: ZeroDivisionError: division by zero"
     assert remedy == f"  Mend it there: {lab / 'doorlab.py'}, line 8, in crash: return 1.0, 1 / 0"
 
 
@@ -134,11 +144,6 @@ def test_a_robot_that_is_none_is_refused(lab, capsys):
     assert "--base is the ROSbot's" in what
     what, remedy = refused(capsys, "robot")
     assert (what, "--driver" in remedy) == ("lira robot: no --base", True)
-
-
-def test_experts_of_ones_own_teach_and_do_not_just_drive(lab, capsys):
-    what, _ = refused(capsys, "fusion", "--policy", "camera-expert", "--expert", "doorlab:wall")
-    assert what == "lira fusion: --expert goes with --method"
 
 
 @pytest.mark.parametrize("verb", ["fusion", "demo"])

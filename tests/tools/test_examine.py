@@ -1,4 +1,4 @@
-"""`lira fusion` on a twin: a policy that drives layouts alone, and a scripted teacher; how each lap went is told."""
+"""On a twin: a policy that drives layouts alone, and a scripted teacher; how each lap went is told."""
 
 import uuid
 
@@ -14,12 +14,12 @@ from lira.tools.launch.processes import ChildProcess, free_port, lira_command
 CAMERA = str(shipped_path("camera", load_profile("thesis-sim")))
 
 
-EXAM = ("--policy", CAMERA, "--layout", "6", "--unseen", "2")
+EXAM = ("drive", CAMERA, "--layout", "6", "--unseen", "2")
 
 
 @pytest.fixture
-def fusion(tmp_path, capsys):
-    """Run `lira fusion` on a twin in lockstep; return the exit status and what is printed."""
+def lira(tmp_path, capsys):
+    """Run a verb on a twin in lockstep; return the exit status and what is printed."""
 
     def run(world, *words):
         address = f"127.0.0.1:{free_port()}"
@@ -27,7 +27,7 @@ def fusion(tmp_path, capsys):
         command = lira_command("twin", "--lockstep", "--name", name, "--listen", address, "--world", world)
         with ChildProcess("twin", command, tmp_path / "twin.log") as twin:
             twin.wait_ready("twin", 30.0)
-            status = cli.main(["fusion", "--name", name, "--connect", address, *words])
+            status = cli.main([*words, "--name", name, "--connect", address])
         return status, capsys.readouterr().out.splitlines()
 
     threads = torch.get_num_threads()
@@ -35,30 +35,30 @@ def fusion(tmp_path, capsys):
     torch.set_num_threads(threads)  # the verb sets it for its whole process
 
 
-def test_each_layout_is_told(fusion, tmp_path):
+def test_each_layout_is_told(lira, tmp_path):
     path = tmp_path / "free.toml"
     path.write_text(SHORT.replace("y_m = 0.1", "y_m = 9.0"))
-    status, lines = fusion(str(path), *EXAM)
+    status, lines = lira(str(path), *EXAM)
     assert status == 0
     assert [line.split()[:4] for line in lines] == [["unseen", "layout", str(k), "passed"] for k in (7, 8)]
 
 
-def test_a_policy_that_hits_a_box_has_failed(fusion, tmp_path):
-    status, lines = fusion(write_world(tmp_path), *EXAM)
+def test_a_policy_that_hits_a_box_has_failed(lira, tmp_path):
+    status, lines = lira(write_world(tmp_path), *EXAM)
     assert status == 1
     assert len(lines) == 2
     assert all("failed" in line and "collisions 1" in line for line in lines)
 
 
-def test_behind_a_shield_it_hits_none_and_how_often_that_was_so_is_told(fusion, tmp_path):
-    _, lines = fusion(write_world(tmp_path), *EXAM, "--shield")
+def test_behind_a_shield_it_hits_none_and_how_often_that_was_so_is_told(lira, tmp_path):
+    _, lines = lira(write_world(tmp_path), *EXAM, "--shield")
     assert len(lines) == 2
     assert all("collisions 0" in line and "turns changed by the shield" in line for line in lines)
 
 
-def test_a_scripted_lesson_is_told_lap_by_lap(fusion, tmp_path):
+def test_a_scripted_lesson_is_told_lap_by_lap(lira, tmp_path):
     words = ("--method", "hg-dagger", "--teacher", "perfect", "--train-laps", "1", "--run", str(tmp_path / "run"))
-    _, lines = fusion(write_world(tmp_path), *words)
+    _, lines = lira(write_world(tmp_path), "fusion", *words)
     assert lines[0].startswith("hg-dagger (hg-dagger) on ")
     assert [line.split()[0] for line in lines[1:3]] == ["training", "proving"]
     assert any(line.startswith("saved ") and "the novice after" in line for line in lines)

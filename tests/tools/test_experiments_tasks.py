@@ -3,8 +3,8 @@
 import msgspec
 import pytest
 
+from lira.fusion.inference.checkpoint import Checkpoint, save_checkpoint
 from lira.fusion.log.run_log import LapRecord, ResultRecord
-from lira.fusion.policies.checkpoint import Checkpoint, save_checkpoint
 from lira.fusion.policies.networks import ExpertNet
 from lira.tools.experiments.studies import corridor, passage, table1
 from lira.tools.experiments.trial import Outcome

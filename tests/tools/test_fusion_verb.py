@@ -1,4 +1,4 @@
-"""What `lira fusion` says to bad input: one line and the remedy, exit status 2, and nothing lost."""
+"""What `lira fusion` and `lira drive` say to bad input: one line and the remedy, exit status 2, and nothing lost."""
 
 import json
 import signal
@@ -13,8 +13,8 @@ import pytest
 import torch
 
 from lira.fusion.experts.files import shipped_path
+from lira.fusion.inference.checkpoint import Checkpoint, save_checkpoint
 from lira.fusion.log.label_log import Demonstration, DemonstrationLog
-from lira.fusion.policies.checkpoint import Checkpoint, save_checkpoint
 from lira.fusion.policies.networks import ExpertNet
 from lira.fusion.preprocess import Features, shapes_of
 from lira.hal.bus.bus import Bus
@@ -78,21 +78,21 @@ def write_log(path, profile=PROFILE, count=3):
 
 
 def test_an_unknown_policy_names_the_known_ones(address, refused):
-    what, remedy = refused("fusion", *address, "--policy", "sonar-expert")
-    assert what == "lira fusion: unknown policy 'sonar-expert'"
+    what, remedy = refused("drive", *address, "sonar-expert")
+    assert what == "lira drive: unknown policy 'sonar-expert'"
     assert "camera-expert, lidar-expert" in remedy
 
 
 def test_a_broken_checkpoint_is_named(address, refused, tmp_path):
     path = tmp_path / "broken.safetensors"
     path.write_bytes(shipped_path("camera", PROFILE).read_bytes()[:-100])
-    what, remedy = refused("fusion", *address, "--policy", path)
+    what, remedy = refused("drive", *address, path)
     assert f"{path} is not a whole .safetensors file" in what
     assert "Restore the file" in remedy
 
 
 def test_a_missing_checkpoint_is_named(address, refused, tmp_path):
-    what, _ = refused("fusion", *address, "--policy", tmp_path / "none.safetensors")
+    what, _ = refused("drive", *address, tmp_path / "none.safetensors")
     assert "there is no checkpoint" in what
 
 
@@ -100,7 +100,7 @@ def test_the_checkpoint_of_another_profile_is_refused(address, refused, tmp_path
     path = tmp_path / "real.safetensors"
     network = ExpertNet("scan", (130,))
     save_checkpoint(path, network, Checkpoint.of(network, "rosbot2", "lira", 0))
-    what, remedy = refused("fusion", *address, "--policy", path)
+    what, remedy = refused("drive", *address, path)
     assert "trained for 'rosbot2'" in what
     assert "the checkpoint of this profile" in remedy
 
@@ -148,21 +148,21 @@ def test_a_folder_that_cannot_be_made_is_named(address, refused, tmp_path, teach
 def test_no_robot_at_the_endpoint_says_how_to_start_one(refused, monkeypatch):
     monkeypatch.setattr(remote, "RemoteRobot", partial(remote.RemoteRobot, answer_s=0.3))
     endpoint = f"127.0.0.1:{free_port()}"
-    what, remedy = refused("fusion", "--connect", endpoint, "--policy", "camera-expert")
-    assert what == f"lira fusion: no robot named 'rosbot' answers 'info' at {endpoint}"
+    what, remedy = refused("drive", "--connect", endpoint, "camera-expert")
+    assert what == f"lira drive: no robot named 'rosbot' answers 'info' at {endpoint}"
     assert "lira twin" in remedy
 
 
 @pytest.mark.parametrize(("words", "named"), [(["--connect", "nowhere"], "'nowhere'"), (["--name", "a/b"], "'a/b'")])
 def test_an_address_or_a_name_that_is_none_is_refused(refused, words, named):
-    assert named in refused("fusion", *words, "--policy", "camera-expert")[0]
+    assert named in refused("drive", *words, "camera-expert")[0]
 
 
 @pytest.mark.parametrize(
     "words",
     [
-        ["fusion", "--policy", "camera-expert", "--seed", "-1"],
-        ["fusion", "--policy", "camera-expert", "--method", "lira"],
+        ["drive", "camera-expert", "--seed", "-1"],
+        ["drive", "camera-expert", "--method", "lira"],
         ["fusion"],
         ["demo", "--layout", "x"],
         ["demo", "--laps", "-2"],
@@ -209,7 +209,8 @@ def test_the_demo_names_a_folder_that_cannot_be_made(refused, tmp_path):
 @pytest.mark.parametrize(
     ("package", "extra", "words"),
     [
-        ("torch", "learn", ["fusion", "--policy", "camera-expert"]),
+        ("torch", "learn", ["fusion", "--method", "plus"]),
+        ("safetensors", "drive", ["drive", "camera-expert"]),
         ("torch", "learn", ["demo"]),
     ],
 )

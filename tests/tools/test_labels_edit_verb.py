@@ -5,14 +5,14 @@ import json
 import numpy as np
 import pytest
 
+from lira.fusion.inference.checkpoint import load_checkpoint
+from lira.fusion.inference.kernel_net import KernelNet
 from lira.fusion.learning.kernel_novice import KernelNovice
 from lira.fusion.learning.labels import Label
 from lira.fusion.learning.novice import LearningSettings
 from lira.fusion.log.label_log import Demonstration, DemonstrationLog, read_demonstrations
 from lira.fusion.log.run_log import RunRecord, RunWriter
-from lira.fusion.policies.checkpoint import load_checkpoint
 from lira.fusion.policies.kernel import KernelSettings
-from lira.fusion.policies.kernel_net import KernelNet
 from lira.fusion.policies.networks import ExpertNet
 from lira.fusion.preprocess import Features
 from lira.hal.profile import load_profile

@@ -5,7 +5,7 @@ import signal
 import pytest
 import torch
 
-from lira.fusion.policies.checkpoint import load_checkpoint
+from lira.fusion.inference.checkpoint import load_checkpoint
 from lira.fusion.teaching.curriculum import CURRICULA, STRICT, Curriculum
 from lira.fusion.teaching.session import Drive
 from lira.hal.messages import Episode

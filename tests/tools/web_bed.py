@@ -49,7 +49,7 @@ def policy(name, endpoint):
 def page_of_robot(folder, *, with_policy=True):
     """The bus, the page's address, and `lira web` as a process."""
     name, endpoint, port = f"web{os.getpid()}", f"127.0.0.1:{free_port()}", free_port()
-    robot = [sys.executable, "-m", "lira.tools.bench.null_robot", name, endpoint]
+    robot = [sys.executable, "-m", "lira.tools.bench.parts.null_robot", name, endpoint]
     with contextlib.ExitStack() as stack:
         server = stack.enter_context(ChildProcess("the robot", robot, folder / "robot.log"))
         server.wait_ready(null_robot.READY, 30.0)

@@ -131,7 +131,7 @@ def run(minutes: float = MINUTES) -> list[Row]:
         there = ["--name", name, "--connect", endpoint]
         watched = [
             start("lira twin", lira_command("twin", "--name", name, "--listen", endpoint), "serves"),
-            start("lira fusion", lira_command("fusion", "--policy", "camera-expert", *there), "drives"),
+            start("lira drive", lira_command("drive", "camera-expert", *there), "drives"),
             start("joystick bridge", [*python, hand.__name__, name, endpoint, str(ear)], hand.READY),
             start("console ears", [*python, watcher.__name__, name, endpoint], watcher.READY),
         ]

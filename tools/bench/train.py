@@ -9,7 +9,7 @@ from torch import Tensor, nn
 
 from lira.fusion.learning.learner import Label, Learner
 from lira.fusion.learning.trainer import ProcessTrainer
-from lira.fusion.policies.networks import ExpertNet, FusionNet, Network
+from lira.fusion.policies.networks import ExpertNet, FusionNet
 from lira.fusion.preprocess import Features, Shape
 from lira.hal.messages import Driver
 from lira.tools.bench import Row
@@ -133,9 +133,9 @@ class PlainLearner:
 
 def control_loop(learner: Learner, filters: int, labels: list[Label]) -> Row:
     """Decide at 20 Hz with all three networks while a process trains; a miss is a decision later than its period."""
-    policies: list[Network] = [
-        *(ExpertNet(*seen, filters) for seen in shapes(filters).items()),
-        FusionNet(shapes(filters), filters),
+    policies = [
+        *(ExpertNet(*seen, filters).driving() for seen in shapes(filters).items()),
+        FusionNet(shapes(filters), filters).driving(),
     ]
     trainer = ProcessTrainer(learner)
     took_s: list[float] = []

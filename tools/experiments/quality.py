@@ -17,16 +17,15 @@ from lira.fusion.learning.kernel_novice import KernelNovice
 from lira.fusion.log.recorder import Journal
 from lira.fusion.log.run_log import LapRecord, Pose, Record, ResultRecord, StepRecord
 from lira.fusion.methods.base import Method
-from lira.fusion.methods.doubt import Doubtful
 from lira.fusion.methods.shield import Shield, Shielded
+from lira.fusion.methods.stop_and_ask import Doubtful
 from lira.fusion.teaching.session import Session
 from lira.hal.messages import Phase
 from lira.hal.profile import Field, RobotProfile, load_profile
 from lira.sim_backend.foresight import with_small_camera
 from lira.sim_backend.world import World
 from lira.tools.experiments.shifts import shifted
-from lira.tools.runs.build import lap
-from lira.tools.runs.course import Course
+from lira.tools.runs.course import Course, lap
 from lira.tools.runs.simulated import SimulatedRobot, simulate
 
 Way = Literal["plain", "field", "shield", "ask"]
@@ -39,8 +38,9 @@ FAR_M = 1.0  # no robot drives so far in a step: it was put down anew
 class Quality(msgspec.Struct, frozen=True):
     """What is asked of a novice: to pass these shares of `layouts` fresh ones after one lap, lowest first.
 
-    `ways` are those in which who reaches a level is tried, under `shift`. After the highest level `more` laps follow.
-    A novice that can reach no level any more after half of the layouts is not driven on the others.
+    `ways` are those in which who reaches the lowest level is tried, under `shift`; the first one goes for all levels.
+    After the highest level `more` laps follow. A novice that can reach no level any more after half of the layouts is
+    not driven on the others.
     """
 
     layouts: int = 12
@@ -181,7 +181,8 @@ def judging(
     place, body = shifted(quality.shift, world, with_small_camera(profile))
 
     def judge(levels: tuple[float, ...]) -> list[Judged]:
-        ways = [way for way in quality.ways if way != "ask" or isinstance(method.novice, KernelNovice)]
+        asked = quality.ways if quality.levels[0] in levels else quality.ways[:1]
+        ways = [way for way in asked if way != "ask" or isinstance(method.novice, KernelNovice)]
         return [_try(levels, way, method, body, place, layouts, hand) for way in ways]
 
     return judge

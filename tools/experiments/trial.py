@@ -8,6 +8,7 @@ from pathlib import Path
 import msgspec
 
 from lira.fusion.experts.tasks import TASKS, task_of
+from lira.fusion.inference.threads import one_thread
 from lira.fusion.learning.trainer import InlineTrainer
 from lira.fusion.log.recorder import Journal
 from lira.fusion.log.run_log import LapRecord, Record, ResultRecord
@@ -92,6 +93,7 @@ def play(trial: Trial) -> Outcome:
     import torch
 
     torch.set_num_threads(1)
+    one_thread()
     profile, world = trial.profile, load_world(trial.world)
     first = UNSEEN + trial.seed * trial.unseen
     layouts = range(first, first + trial.unseen)

@@ -3,14 +3,14 @@
 from dataclasses import replace
 from pathlib import Path
 
+from lira.fusion.inference.checkpoint import load_checkpoint, save_checkpoint
+from lira.fusion.inference.kernel_net import KernelNet
 from lira.fusion.learning.kernel_novice import KernelNovice
 from lira.fusion.learning.labels import Label
 from lira.fusion.log.label_log import read_demonstrations
 from lira.fusion.log.run_log import RunRecord, read_run
 from lira.fusion.methods.presets import METHODS, Preset
-from lira.fusion.policies.checkpoint import load_checkpoint, save_checkpoint
 from lira.fusion.policies.kernel import KernelSettings
-from lira.fusion.policies.kernel_net import KernelNet
 from lira.hal.errors import ConfigError
 from lira.tools.runs.folder import LABELS, NOVICE, RECORD
 
@@ -51,7 +51,7 @@ def rewrite(log: Path) -> str:
         return f"{path} still knows them; it is learned anew when teaching goes on: lira fusion --method NAME --run DIR"
     _, about = load_checkpoint(path)
     network = novice.frozen()
-    save_checkpoint(path, network, replace(about, labels=len(learned), examples=network.examples))
+    save_checkpoint(path, network, replace(about, labels=len(learned), examples=network.architecture.examples))
     return f"{path} was learned anew from {len(learned)} labels; it has not been proven since"
 
 

@@ -7,6 +7,9 @@ import msgspec
 from lira.fusion.experts.files import EXPERTS, experts_of
 from lira.fusion.experts.load import as_expert, load_network, load_policy
 from lira.fusion.experts.tasks import DEFAULT
+from lira.fusion.inference.architecture import FUSION, KERNEL
+from lira.fusion.inference.kernel_net import KernelNet
+from lira.fusion.inference.networks import DrivingNet
 from lira.fusion.learning.kernel_novice import KernelNovice
 from lira.fusion.learning.learner import Learner
 from lira.fusion.learning.novice import NetworkNovice, Novice, Trainer
@@ -14,19 +17,15 @@ from lira.fusion.methods.base import Expert, Method, Policy
 from lira.fusion.methods.context import Context, Trunks
 from lira.fusion.methods.presets import Preset
 from lira.fusion.policies.ensemble import EnsembleNet
-from lira.fusion.policies.kernel_net import KernelNet
-from lira.fusion.policies.networks import ExpertNet, FusionNet, Network, seen_by
-from lira.fusion.teaching.session import Drive
+from lira.fusion.policies.networks import FusionNet
 from lira.fusion.teaching.teacher import ScriptedTeacher, TeacherSettings
 from lira.hal.errors import ConfigError
-from lira.hal.messages import Driver, Episode
+from lira.hal.messages import Driver
 from lira.hal.profile import RobotProfile
 from lira.sim_backend.foresight import Foresight
-from lira.sim_backend.layout import build as build_layout
 from lira.sim_backend.world import World
 from lira.tools.runs.warm_start import warm_up
 
-PATIENCE = 4.0  # a lap may take so many times as long as at full speed
 NewTrainer = Callable[[Learner], Trainer]
 
 
@@ -59,33 +58,27 @@ def build_method(
             novice = KernelNovice(KernelNet.from_experts(sees), learning, preset.kernel, mirrored=preset.mirrored)
         else:
             frozen = (trunks or preset.trunks) == "frozen"
-            network = new_network(sees, seed, frozen=frozen)
+            network = FusionNet.from_experts(sees, frozen=frozen, seed=seed)
             if ensemble:
                 network = EnsembleNet(network, ensemble, seed)
             learner = Learner(network, seed=seed, frozen_trunks=frozen, mirrored=preset.mirrored)
-            novice = NetworkNovice(network, trainer(learner), learning)
+            novice = NetworkNovice(network.driving(), trainer(learner), learning)
         warm_up(novice, preset.warm, profile, pair)
         return novice
 
     return (build or preset.build)(Context(profile, experts, seed, new_novice))
 
 
-def seeing(experts: Sequence[Network]) -> list[ExpertNet]:
+def seeing(experts: Sequence[DrivingNet]) -> Sequence[DrivingNet]:
     """Return the networks whose trunks a novice may see with. Raises `ConfigError` for those of another kind."""
-    seen = [expert for expert in experts if isinstance(expert, ExpertNet)]
-    if len(seen) < len(experts):
+    if any(expert.kind in (FUSION, KERNEL) for expert in experts):
         raise ConfigError(
             "the experts are of the wrong kind", f"Train them anew: lira train-expert {'|'.join(EXPERTS)}"
         )
-    return seen
+    return experts
 
 
-def new_network(experts: Sequence[ExpertNet], seed: int, *, frozen: bool) -> FusionNet:
-    """Make an untrained novice's network: with copies of the experts' trunks, or of their shapes only."""
-    return FusionNet.from_experts(experts, seed=seed) if frozen else FusionNet(*seen_by(experts), seed=seed)
-
-
-def load_pair(profile: RobotProfile, pair: str = DEFAULT) -> list[tuple[Network, Expert]]:
+def load_pair(profile: RobotProfile, pair: str = DEFAULT) -> list[tuple[DrivingNet, Expert]]:
     """Load the expert of each sensor that a robot learns from. Raises `ConfigError`."""
     loaded = [(name, *load_network(f"{name}-expert", profile, pair)) for name in experts_of(profile)]
     return [(network, as_expert(name, network, file.cruise)) for name, network, file in loaded]
@@ -94,10 +87,3 @@ def load_pair(profile: RobotProfile, pair: str = DEFAULT) -> list[tuple[Network,
 def teacher(skill: TeacherSettings, profile: RobotProfile, world: World, layout: int, seed: int) -> ScriptedTeacher:
     """Build a scripted teacher that can look ahead in a twin of its own."""
     return ScriptedTeacher(Foresight(profile, world, layout), profile, skill, seed)
-
-
-def lap(profile: RobotProfile, world: World, layout: int) -> Drive:
-    """One lap of a world, with time enough for slow parts."""
-    curve = build_layout(world, layout).curve
-    length_m = world.limits.finish_m or curve.length_m * world.limits.laps
-    return Drive(Episode(layout), limit_s=PATIENCE * length_m / profile.base.max_linear_m_s)

@@ -11,11 +11,13 @@ from lira.fusion.methods.base import Method
 from lira.fusion.methods.shield import Shield, Shielded
 from lira.fusion.methods.syllabus import THESIS, Syllabus
 from lira.fusion.teaching.session import Drive, Session
-from lira.hal.messages import Phase
+from lira.hal.messages import Episode, Phase
 from lira.hal.port import Arena, Robot
 from lira.hal.profile import RobotProfile
+from lira.sim_backend.layout import build as build_layout
 from lira.sim_backend.world import World
-from lira.tools.runs.build import lap
+
+PATIENCE = 4.0  # a lap may take so many times as long as at full speed
 
 
 @dataclass(frozen=True, slots=True)
@@ -94,3 +96,10 @@ def show_alone(robot: Robot, arena: Arena, method: Method, journal: Journal, cou
     session = Session(robot, arena, loop, journal, None, lambda _: method)
     loop.arm()
     return all(each.passed for each in session.show(course.shown()))
+
+
+def lap(profile: RobotProfile, world: World, layout: int) -> Drive:
+    """One lap of a world, with time enough for slow parts."""
+    curve = build_layout(world, layout).curve
+    length_m = world.limits.finish_m or curve.length_m * world.limits.laps
+    return Drive(Episode(layout), limit_s=PATIENCE * length_m / profile.base.max_linear_m_s)

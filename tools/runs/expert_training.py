@@ -11,14 +11,15 @@ import torch
 from lira.fusion.control import ControlLoop
 from lira.fusion.experts.files import experts_of, folder_of, seeded
 from lira.fusion.experts.tasks import DEFAULT, TASKS
+from lira.fusion.inference.checkpoint import Checkpoint, save_checkpoint
+from lira.fusion.inference.networks import DrivingNet
 from lira.fusion.learning.learner import Learner
 from lira.fusion.learning.novice import LearningSettings, NetworkNovice
 from lira.fusion.learning.trainer import InlineTrainer
 from lira.fusion.log.recorder import Journal
 from lira.fusion.methods.base import Alone
 from lira.fusion.methods.rivals.hg_dagger import HgDagger
-from lira.fusion.policies.checkpoint import Checkpoint, save_checkpoint
-from lira.fusion.policies.networks import ExpertNet, Network
+from lira.fusion.policies.networks import ExpertNet
 from lira.fusion.preprocess import modalities_of
 from lira.fusion.teaching.curriculum import Curriculum, curriculum
 from lira.fusion.teaching.session import Same, Session
@@ -29,8 +30,8 @@ from lira.hal.profile import RobotProfile, load_profile
 from lira.sim_backend.catalogue import load_world
 from lira.sim_backend.foresight import Foresight, with_small_camera
 from lira.sim_backend.scenes.opening import quickest
+from lira.tools.runs.progress import telling
 from lira.tools.runs.simulated import simulate
-from lira.tools.runs.teach import telling
 
 BLIND_HZ = 0.01
 
@@ -43,7 +44,8 @@ def train_expert(kind: str, task: str, profile: RobotProfile, seed: int, path: P
     sees = next(row for row in modalities_of(profile) if row.sensor == kind)
     profile = seeing_only(sees.name, with_small_camera(profile))
     network = ExpertNet(sees.name, sees.shape(profile), profile.features.filters, seed=seed)
-    novice = NetworkNovice(network, InlineTrainer(Learner(network, seed=seed, frozen_trunks=False)), LearningSettings())
+    trainer = InlineTrainer(Learner(network, seed=seed, frozen_trunks=False))
+    novice = NetworkNovice(network.driving(), trainer, LearningSettings())
     with (
         simulate(world, profile, seed=seed, renderer=quickest(world)) as robot,
         closing(ScriptedTeacher(Foresight(profile, world), profile, course.teacher, seed)) as teacher,
@@ -53,9 +55,10 @@ def train_expert(kind: str, task: str, profile: RobotProfile, seed: int, path: P
         loop.arm()
         passed = session.teach(Same(course.drives), teacher, course.laps)
     if passed:
-        cruise = measure_cruise(network, profile, course)
-        about = Checkpoint.of(network, profile.name, command, seed, cruise)
-        save_checkpoint(path, network, replace(about, labels=novice.stored, training_steps=novice.training_steps))
+        expert = novice.frozen()
+        cruise = measure_cruise(expert, profile, course)
+        about = Checkpoint.of(expert, profile.name, command, seed, cruise)
+        save_checkpoint(path, expert, replace(about, labels=novice.stored, training_steps=novice.training_steps))
         print(f"{kind} expert: {novice.stored} labels, {novice.training_steps} training steps, saved to {path}")
     return passed
 
@@ -94,7 +97,7 @@ def seeing_only(name: str, profile: RobotProfile) -> RobotProfile:
     return msgspec.structs.replace(profile, features=features, camera=camera)
 
 
-def measure_cruise(network: Network, profile: RobotProfile, course: Curriculum) -> Action:
+def measure_cruise(network: DrivingNet, profile: RobotProfile, course: Curriculum) -> Action:
     """Median action where the world is straight and empty: what the expert does with nothing to react to."""
     alone = Alone(Driver.NOVICE, network.act)
     with simulate(course.cruise_world, profile) as robot:

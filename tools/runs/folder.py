@@ -4,17 +4,16 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
 
+from lira.fusion.inference.checkpoint import Checkpoint, save_checkpoint
 from lira.fusion.learning.learned_policy import Contradiction, LearnedPolicy
 from lira.fusion.log.label_log import read_demonstrations
 from lira.fusion.log.run_log import ContradictionRecord, RunRecord
 from lira.fusion.operator_service import Job
-from lira.fusion.policies.checkpoint import Checkpoint, save_checkpoint
 from lira.hal.errors import ConfigError
 from lira.hal.profile import RobotProfile
 from lira.tools.output.proven import contradiction_words
 
 LABELS, RECORD, NOVICE = "labels.lira", "run.jsonl", "novice.safetensors"
-FLOOR = "floor"  # the world of a robot that is in none of ours
 
 
 def check_fresh(folder: Path) -> None:

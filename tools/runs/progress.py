@@ -2,6 +2,7 @@
 
 import shutil
 import time
+from collections.abc import Callable
 from pathlib import Path
 from typing import TextIO
 
@@ -10,8 +11,11 @@ import msgspec
 from lira.fusion.log.run_log import LapRecord, Record, ResultRecord, RunRecord, StepRecord, VerdictRecord
 from lira.hal.config import MALFORMED
 from lira.hal.errors import StorageError
-from lira.hal.messages import Call, Phase
+from lira.hal.messages import Call, Decision, Phase
 from lira.tools.output.proven import proof_words
+
+Publish = Callable[[Decision], None]
+Say = Callable[[str], None]
 
 PHASES = {Phase.TRAIN: "training lap", Phase.PROVE: "proving run", Phase.UNSEEN: "unseen layout"}
 TTY_PERIOD_S = 0.1
@@ -149,3 +153,17 @@ class Display:
             self._stream.write("\r\x1b[K")
             self._stream.flush()
             self._shown = ""
+
+
+def telling(say: Say, write: Callable[[Record], None] | None = None) -> Callable[[Record], None]:
+    """Return what says how each lap went, and writes every record if there is where to."""
+    progress = Progress()
+
+    def take(record: Record) -> None:
+        if write is not None:
+            write(record)
+        line = progress.note(record)
+        if line is not None:
+            say(line)
+
+    return take

@@ -9,6 +9,7 @@ import msgspec
 from lira.fusion.control import ControlLoop, Step
 from lira.fusion.experts.load import load_alone
 from lira.fusion.experts.tasks import DEFAULT
+from lira.fusion.inference.threads import one_thread
 from lira.fusion.learning.trainer import InlineTrainer
 from lira.fusion.methods.base import Expert, Method, Policy
 from lira.fusion.methods.context import Context, MethodSettings
@@ -88,6 +89,7 @@ def teach(
     import torch
 
     torch.set_num_threads(1)  # a result should not depend on the number of cores
+    one_thread()
     arena = robot.arena
     if arena is None:
         raise ConfigError("only a twin has laps to teach on", "With a person as teacher: lira fusion --method.")

@@ -13,7 +13,7 @@ from lira.fusion.methods.base import Expert, Method, Policy
 from lira.fusion.methods.context import Context
 from lira.fusion.methods.presets import Preset
 from lira.fusion.teaching.teacher import TEACHERS
-from lira.hal.messages import Decision, Phase
+from lira.hal.messages import Phase
 from lira.hal.port import Arena, Robot
 from lira.hal.profile import RobotProfile
 from lira.sim_backend.world import World
@@ -22,10 +22,7 @@ from lira.tools.launch.lifetime import saving
 from lira.tools.runs.build import NewTrainer, build_method, teacher
 from lira.tools.runs.course import Course, run_course
 from lira.tools.runs.folder import LABELS, RECORD, check_fresh, snapshot
-from lira.tools.runs.progress import Progress
-
-Publish = Callable[[Decision], None]
-Say = Callable[[str], None]
+from lira.tools.runs.progress import Publish, Say, telling
 
 
 def _nowhere(_: object) -> None:
@@ -119,17 +116,3 @@ def teach_on(
         result = run_course(robot, arena, method, hand, journal, course, kept)
         note(result)
         return Taught(method.alone(Phase.UNSEEN), result, laps)
-
-
-def telling(say: Say, write: Callable[[Record], None] | None = None) -> Callable[[Record], None]:
-    """Return what says how each lap went, and writes every record if there is where to."""
-    progress = Progress()
-
-    def take(record: Record) -> None:
-        if write is not None:
-            write(record)
-        line = progress.note(record)
-        if line is not None:
-            say(line)
-
-    return take

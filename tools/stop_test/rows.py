@@ -208,8 +208,8 @@ ROWS = (
         resumes=True),
     Row("robot's main thread hangs", robot_does("main hangs"), silence=True, hold_s=2.0, trials=1),
     # The learner.
-    Row("lira fusion killed (kill -9)", KILL, drives=LIRA, setup=FUSION, trials=1),
-    Row("lira fusion frozen (SIGSTOP)", FREEZE, THAW, hold_s=1.6, drives=LIRA, setup=FUSION, trials=1),
+    Row("lira drive killed (kill -9)", KILL, drives=LIRA, setup=FUSION, trials=1),
+    Row("lira drive frozen (SIGSTOP)", FREEZE, THAW, hold_s=1.6, drives=LIRA, setup=FUSION, trials=1),
     Row("robot restarted under the learner", acts.end_robot, acts.restart_robot, drives=LIRA, setup=LEARNER,
         stopped_by=(WATCHDOG, FAREWELL), trials=1),
     Row("disk full under labels and record", acts.fill_disk, acts.see_it_told, hold_s=3.0,

@@ -12,7 +12,7 @@ LIBRARIES = "/usr/lib/*/faketime/libfaketimeMT.so.1", "/usr/lib*/faketime/libfak
 class Setup:
     """One arrangement of processes. Without anything: a twin, a driver by control messages, and a relay between them.
 
-    `profile` None: what was asked for. `fusion`: words for `lira fusion`, which then is the commander; `{run}` is a
+    `profile` None: what was asked for. `fusion`: what `lira` is told, which then is the commander; `{run}` is a
     folder. `drivers`: the robot's are the physical ones, on the devices of a world in another process. `ros2`: the
     robot runs ROS 2, and what is tested is on this side of its bridge. `link`: a process of its own in the link.
     `clocks`: the time of day can be set in each process. `keys`: the bus has some.
@@ -34,11 +34,11 @@ class Setup:
 
 
 TWIN = Setup("a twin and a driver by control messages")
-FUSION = Setup("lira fusion", profile="thesis-sim", fusion=("--policy", "camera-expert"))
+FUSION = Setup("lira drive", profile="thesis-sim", fusion=("drive", "camera-expert"))
 LEARNER = Setup(
     "lira fusion, learning",
     profile="thesis-sim",
-    fusion=("--method", "lira", "--start", "experts", "--run", "{run}"),
+    fusion=("fusion", "--method", "lira", "--start", "experts", "--run", "{run}"),
 )
 DRIVERS = Setup("the physical robot's drivers", drivers=True)
 ROS2 = Setup("a robot that runs ROS 2", ros2=True)

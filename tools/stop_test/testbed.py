@@ -236,7 +236,7 @@ class ProcessBench:
         if self._setup.fusion:
             self._runs += 1
             fusion = [word.format(run=self.run_folder) for word in self._setup.fusion]
-            words = ["fusion", *fusion, "--name", self.name, "--connect", f"127.0.0.1:{self._front}"]
+            words = [*fusion, "--name", self.name, "--connect", f"127.0.0.1:{self._front}"]
             self._run(POLICY, self._commands.start(POLICY, "lira.tools", words, self._certificate, "fusion"), self.name)
             return
         if role not in self._running or self._running[role].status() is not None:

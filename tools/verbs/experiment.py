@@ -35,7 +35,7 @@ ALL, RESULTS = "all", "results"
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
-    names = "; ".join(f"{name}: {entry.words}" for name, entry in REGISTRY.items())
+    names = "; ".join(f"{name}: {entry.words}" for name, entry in REGISTRY.items()).replace("%", "%%")
     add = parser.add_argument
     add("name", metavar="NAME", help=f"{names}; {ALL}; {RESULTS}; or one of your own: MODULE:OBJECT")
     add("--seeds", type=int, default=3, help="repetitions, seeds 0, 1, 2, ... (default: %(default)s)")

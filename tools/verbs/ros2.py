@@ -7,7 +7,7 @@ the robot's own ROS stack does stops it. robot/README.md says more.
 examples:
   lira ros2 --connect rosbot:7447 --cmd-vel twist_stamped --lidar-yaw 180
   lira ros2 --connect rosbot:7447 --namespace robot1 --topic odom=odometry/filtered --topic cmd_vel=base/cmd_vel
-  lira fusion --policy lidar-expert
+  lira drive lidar-expert
 """
 
 import argparse

@@ -1,7 +1,7 @@
 """Run the digital twin: a simulated ROSbot on the bus, driven exactly like the real one.
 
 It publishes the sensors and obeys velocity commands below its name (rosbot/scan, rosbot/cmd_vel, ...). Start a driver
-in another shell, for example `lira fusion --policy camera-expert`. Without one the robot stands.
+in another shell, for example `lira drive camera-expert`. Without one the robot stands.
 
 examples:
   lira twin                                   the line world in real time, for anyone on this machine

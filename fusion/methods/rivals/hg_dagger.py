@@ -6,7 +6,8 @@ At test time the novice may doubt: `fusion/methods/doubt.py`.
 from lira.fusion.learning.novice import Novice
 from lira.fusion.methods.base import STAND, Choice, Lesson, Method, Proposal
 from lira.fusion.methods.context import Context, MethodSettings
-from lira.fusion.methods.doubt import Doubtful, DoubtLog, doubt_of
+from lira.fusion.methods.doubt import DoubtLog, doubt_of
+from lira.fusion.methods.stop_and_ask import Doubtful
 from lira.fusion.preprocess import Features
 from lira.hal.messages import Action, Call, Driver, Phase
 

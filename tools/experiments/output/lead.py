@@ -9,6 +9,7 @@ from lira.tools.bench import cell
 from lira.tools.experiments.experiment import Picture, Row
 from lira.tools.experiments.output.markdown import table
 from lira.tools.experiments.output.summary import Summary
+from lira.tools.experiments.pairs import TOTAL
 
 LED_BY = "unseen"
 PARTS = "ablation"
@@ -28,7 +29,8 @@ EFFORT = """
 After each training lap the novice alone drives 12 fresh layouts. Effort to 90 % is what a method had taken when 11 of
 them were passed; who did not get there within the cap of laps is censored, and counts with what it had used. Unseen:
 12 other layouts a run, which decided nothing, driven by the novice that had just reached 90 %, without any protection.
-Ratios are the method's effort over that of `plus`, pair by pair of one seed: medians, 95 % bootstrap intervals.
+Ratios are the method's effort over that of `plus`, pair by pair of one seed: medians, 95 % bootstrap intervals; labels
+without and with the demonstration, which is all that cloning takes.
 """
 DEPLOYED = """
 The same novices on the same 12 layouts, as they are, behind the protective field, behind the shield, and with somebody
@@ -78,6 +80,7 @@ def effort(summary: Summary) -> list[Row]:
             "unseen passed": passed(row),
             "collisions per 100 m": row["collisions_100m"],
             "labels over plus": ratio(summary, row, "human_labels"),
+            "with demonstration": ratio(summary, row, TOTAL),
             "interventions over plus": ratio(summary, row, "interventions"),
         }
         for row in rows

@@ -6,13 +6,13 @@ from pathlib import Path
 from typing import Annotated, Any, Self
 
 import msgspec
-import torch
 from msgspec import Meta
 from safetensors import SafetensorError, safe_open
 from safetensors.numpy import save
 
-from lira.fusion.policies.kernel_net import KernelNet
-from lira.fusion.policies.networks import ExpertNet, FusionNet, Network, Weights
+from lira.fusion.inference.architecture import FUSION, KERNEL, Architecture, Weighted, Weights, check_shapes
+from lira.fusion.inference.build import driving
+from lira.fusion.inference.networks import DrivingNet
 from lira.fusion.preprocess import MODALITIES, Shape
 from lira.hal.config import MALFORMED, open_regular, write_whole
 from lira.hal.errors import StorageError
@@ -20,7 +20,6 @@ from lira.hal.messages import Action
 from lira.hal.profile import MAX_FILTERS
 
 MOST_BYTES = 2**28  # eighty times the largest network that any robot here needs
-NOVICES = (FusionNet.kind, KernelNet.kind)
 MOST_EXAMPLES = 4096
 _KEY = "lira"  # the one metadata entry, JSON
 _Share = Annotated[float, Meta(ge=-1.01, le=1.01)]  # of a robot's top speed
@@ -49,19 +48,27 @@ class Checkpoint:
     examples: Annotated[int, Meta(ge=0, le=MOST_EXAMPLES)] = 0
 
     @classmethod
-    def of(cls, network: Network, profile: str, provenance: str, seed: int, cruise: Action | None = None) -> Self:
+    def of(cls, network: Weighted, profile: str, provenance: str, seed: int, cruise: Action | None = None) -> Self:
         """Describe a network that was trained for a robot with this profile."""
-        shapes, filters = network.shapes, network.filters
-        return cls(network.kind, shapes, filters, profile, cruise, provenance, seed, examples=network.examples)
+        what = network.architecture
+        shapes = dict(what.shapes)
+        return cls(what.kind, shapes, what.filters, profile, cruise, provenance, seed, examples=what.examples)
+
+    @property
+    def architecture(self) -> Architecture:
+        """What the network is. Raises `ValueError` for one that cannot be."""
+        if len(self.features) > len(MODALITIES):
+            raise ValueError(f"a network of {len(self.features)} features")
+        return Architecture(self.kind, self.features, self.filters, self.examples)
 
 
-def save_checkpoint(path: Path, network: Network, checkpoint: Checkpoint) -> None:
+def save_checkpoint(path: Path, network: Weighted, checkpoint: Checkpoint) -> None:
     """Write a checkpoint whole or not at all. Raises `StorageError`."""
     about = {name: value for name, value in asdict(checkpoint).items() if name != "examples" or value}
     write_whole(path, save(network.weights(), {_KEY: json.dumps(about)}), folder=True)
 
 
-def load_checkpoint(path: Path) -> tuple[Network, Checkpoint]:
+def load_checkpoint(path: Path) -> tuple[DrivingNet, Checkpoint]:
     """Read a checkpoint. Raises `StorageError` for a file that is missing, corrupt or of another kind.
 
     Its shapes are compared with what it says of itself before a network is built or a weight is read.
@@ -78,10 +85,10 @@ def load_checkpoint(path: Path) -> tuple[Network, Checkpoint]:
             about = msgspec.json.decode(metadata[_KEY], type=dict[str, Any])
             checkpoint = msgspec.convert(_named(about), Checkpoint)
             names = file.keys()
-            _check_shapes(checkpoint, {name: tuple(file.get_slice(name).get_shape()) for name in names})
+            found = {name: tuple(file.get_slice(name).get_shape()) for name in names}
+            check_shapes(checkpoint.architecture.weights, found)
             weights: Weights = {name: file.get_tensor(name) for name in names}
-        network = build(checkpoint)
-        network.load_weights(weights)
+        network = driving(checkpoint.architecture, weights)
     except (SafetensorError, OSError) as error:
         raise StorageError(f"{path} is not a whole .safetensors file: {error}", remedy) from error
     except MALFORMED as error:
@@ -100,40 +107,11 @@ def _check_size(path: Path) -> None:
         raise StorageError(f"{path} has more than {MOST_BYTES} bytes", "Give a file that 'lira' has written.")
 
 
-def _check_shapes(checkpoint: Checkpoint, found: dict[str, tuple[int, ...]]) -> None:
-    """Compare shapes with those of the network described, of which nothing is allocated. Raises `ValueError`."""
-    with torch.device("meta"):
-        own = {name: tuple(tensor.shape) for name, tensor in build(checkpoint).state_dict().items()}
-    if own.keys() != found.keys():
-        raise ValueError(f"weights of another network: {', '.join(sorted(own.keys() ^ found.keys()))}")
-    for name, shape in own.items():
-        if found[name] != shape:
-            raise ValueError(f"{name} is {found[name]} instead of {shape}")
-
-
 def _named(about: dict[str, Any]) -> dict[str, Any]:
     """Say by name which features a file is about that was written when there were only two, by their sizes."""
     if "features" in about or not {"kind", "bins", "filters"} <= about.keys():
         return about
     px = about.get("px", 32)
     both = {"image": [px, px], "scan": [about["bins"]]}
-    seen = {name: shape for name, shape in both.items() if about["kind"] in (MODALITIES[name].sensor, *NOVICES)}
+    seen = {name: shape for name, shape in both.items() if about["kind"] in (MODALITIES[name].sensor, FUSION, KERNEL)}
     return {**about, "features": seen, "filters": about["filters"] if "image" in seen else 0}
-
-
-def build(checkpoint: Checkpoint) -> Network:
-    """Make the network a checkpoint describes, with fresh weights. Raises `ValueError` for one that nobody trains."""
-    if not 0 <= checkpoint.examples <= MOST_EXAMPLES:
-        raise ValueError(f"a kernel of {checkpoint.examples} examples")
-    shapes, filters, seed = checkpoint.features, checkpoint.filters, checkpoint.seed
-    if not shapes or len(shapes) > len(MODALITIES):
-        raise ValueError(f"a network of {len(shapes)} features")
-    if checkpoint.kind == KernelNet.kind:
-        return KernelNet(shapes, filters, examples=checkpoint.examples)
-    if checkpoint.kind == FusionNet.kind:
-        return FusionNet(shapes, filters, seed=seed)
-    (name, shape), *others = shapes.items()
-    network = ExpertNet(name, shape, filters, seed=seed)
-    if others or network.kind != checkpoint.kind:
-        raise ValueError(f"a {checkpoint.kind} network that sees {', '.join(shapes)}")
-    return network

@@ -1,0 +1,1 @@
+"""Networks as they drive: the forward pass in numpy and their files, without torch."""

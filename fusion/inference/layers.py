@@ -1,0 +1,60 @@
+"""The layers of Appendix B's networks for one observation at a time, in numpy, with nothing allocated on the way.
+
+At a batch of one a framework spends more time on calling its layers than on computing them.
+"""
+
+import numpy as np
+from numpy.lib.stride_tricks import as_strided
+
+from lira.hal.messages import FloatArray
+
+SLOPE = np.float32(0.3)  # of the leaky rectifiers
+KERNEL = 3  # a convolution sees 3 x 3 pixels
+
+
+def leaky_relu(x: FloatArray, scratch: FloatArray) -> FloatArray:
+    """Rectify in place; `scratch` has the same shape."""
+    np.multiply(x, SLOPE, out=scratch)
+    return np.maximum(x, scratch, out=x)
+
+
+class Dense:
+    """y = W x + b, with a leaky rectifier behind it where `rectified`."""
+
+    def __init__(self, weight: FloatArray, bias: FloatArray, *, rectified: bool) -> None:
+        """`weight` float32 [out, in], `bias` [out]."""
+        self._weight, self._bias, self._rectified = np.ascontiguousarray(weight), bias, rectified
+        self._out, self._scratch = np.empty_like(bias), np.empty_like(bias)
+
+    def __call__(self, x: FloatArray) -> FloatArray:
+        """Return y [out] of x [in]; the next call writes over it."""
+        y = np.dot(self._weight, x, out=self._out)
+        np.add(y, self._bias, out=y)
+        return leaky_relu(y, self._scratch) if self._rectified else y
+
+
+class Convolution:
+    """3 x 3, valid, stride 1: the patches as columns (im2col), and one product of matrices.
+
+    A channel is its rows one behind the other, `pitch` values each, however many of them are valid: so the column of
+    one place in the kernel is one piece of memory. Each convolution leaves two values more at the end of a row that
+    belong to no pixel.
+    """
+
+    def __init__(self, weight: FloatArray, rows: int, pitch: int) -> None:
+        """`weight` float32 [out, in, 3, 3]; the input has so many rows."""
+        filters, channels = weight.shape[:2]
+        taken = (rows - KERNEL + 1) * pitch
+        padded = np.zeros((channels, rows * pitch + KERNEL - 1), np.float32)  # the last pixel's patch ends behind it
+        self.input = padded[:, : rows * pitch]
+        channel, value = padded.strides
+        kernel = (channels, KERNEL, KERNEL, taken)
+        self._patches = as_strided(padded, kernel, (channel, value * pitch, value, value), writeable=False)
+        self._columns = np.empty(kernel, np.float32)
+        self._weight = np.ascontiguousarray(weight).reshape(filters, -1)
+        self._out = np.empty((filters, taken), np.float32)
+
+    def __call__(self) -> FloatArray:
+        """Return the output [out, (rows - 2) * pitch] of what is in `input`; the next call writes over it."""
+        np.copyto(self._columns, self._patches)
+        return np.matmul(self._weight, self._columns.reshape(self._weight.shape[1], -1), out=self._out)

@@ -1,0 +1,167 @@
+"""Networks as they drive, held to the same networks as they train; and what drives needs no torch."""
+
+import subprocess
+import sys
+from threading import Thread
+
+import numpy as np
+import pytest
+import torch
+from nets import camera_net, fusion_net, kernel_net, lidar_net, noise
+
+from lira.fusion.inference.architecture import Architecture
+from lira.fusion.inference.build import alone, driving
+from lira.fusion.inference.trunks import PictureTrunk
+from lira.fusion.policies.ensemble import EnsembleNet
+from lira.fusion.policies.kernel import KernelSettings, kernel, unit
+from lira.fusion.policies.networks import ExpertNet, FusionNet, batch_of_one
+from lira.fusion.preprocess import Features
+
+BINS = {16: 101, 32: 130}
+
+
+@pytest.mark.parametrize("filters", BINS)
+@pytest.mark.parametrize(
+    "make", [fusion_net, lambda _, f, **a: camera_net(f, **a), lambda b, _, **a: lidar_net(b, **a)]
+)
+def test_what_drives_does_what_torch_does(make, filters):
+    network = make(BINS[filters], filters, seed=3)
+    for bias in (tensor for name, tensor in network.named_parameters() if name.endswith("bias")):
+        torch.nn.init.uniform_(bias, -0.5, 0.5, generator=torch.Generator().manual_seed(len(bias)))
+    driver = network.driving()
+    for seed in range(20):
+        seen = noise(BINS[filters], seed)
+        with torch.inference_mode():
+            inputs = batch_of_one(seen)
+            expected, features = network(inputs)[0].tolist(), network.features(inputs)[0].numpy()
+        np.testing.assert_allclose(driver.features(seen), features, atol=1e-5)
+        assert driver.act(seen) == pytest.approx(expected, abs=1e-5)
+
+
+@pytest.mark.parametrize("px", [6, 7, 24, 31, 32])
+def test_pictures_of_any_size_are_seen(px):
+    network = ExpertNet("depth", (px, px), 3, seed=2)
+    seen = Features(depth=np.random.default_rng(0).random((px, px), dtype=np.float32))
+    with torch.inference_mode():
+        expected = network(batch_of_one(seen))[0].tolist()
+    assert network.driving().act(seen) == pytest.approx(expected, abs=1e-5)
+
+
+def test_an_ensemble_s_opinions_are_those_of_torch_and_alone_it_has_none():
+    ensemble = EnsembleNet(fusion_net(101, 16, seed=1), members=3, seed=7)
+    driver, seen = ensemble.driving(), noise(101)
+    with torch.inference_mode():
+        expected = ensemble.member_heads(ensemble.features(batch_of_one(seen)))[:, 0].numpy()
+    np.testing.assert_allclose(driver.opinions(seen), expected, atol=1e-5)
+    assert alone(driver).act(seen) == driver.act(seen)
+    assert "member_weights.0" not in alone(driver).weights()
+
+
+def test_a_kernel_s_page_and_what_drives_agree():
+    n, rng = 40, np.random.default_rng(4)
+    blank = kernel_net(101, 16, seed=6)
+    what = Architecture("kernel", blank.architecture.shapes, 16, examples=n)
+    x = np.stack([blank.see(noise(101, seed)) for seed in range(n)])
+    weights = blank.weights() | {
+        "x": x,
+        "y": rng.uniform(-1, 1, (n, 2)).astype(np.float32),
+        "noise": np.full(n, 0.1, np.float32),
+        "lengths": np.full(2, KernelSettings().length, np.float32),
+        "gain": np.full(1, 1.3, np.float32),
+    }
+    network = driving(what, weights)
+    sizes, lengths = what.trunk_sizes, weights["lengths"].tolist()
+    torch.testing.assert_close(unit(torch.from_numpy(x), sizes), torch.from_numpy(x))
+    states = torch.from_numpy(x)
+    p = torch.linalg.inv(kernel(states, states, sizes, lengths) + 0.1 * torch.eye(n, dtype=torch.float64))
+    for seed in (3, 99):
+        seen = noise(101, seed)
+        k = kernel(states, torch.from_numpy(blank.see(seen))[None], sizes, lengths)[:, 0]
+        linear, angular = (k @ (p @ torch.from_numpy(weights["y"]).double())).tolist()
+        assert network.act(seen) == pytest.approx((linear, np.clip(1.3 * angular, -1, 1)), abs=1e-5)
+        deviation = float((1 - k @ p @ k).clamp(min=0).sqrt())
+        assert network.deviation(seen) == pytest.approx((deviation, deviation), abs=1e-5)
+
+
+def test_what_experts_and_novice_see_with_the_same_trunk_is_looked_at_once_a_step(monkeypatch):
+    looked = []
+    look = PictureTrunk._look
+    monkeypatch.setattr(PictureTrunk, "_look", lambda self, seen: looked.append(1) or look(self, seen))
+    camera = camera_net(16, seed=4)
+    novice = FusionNet.from_experts([camera, lidar_net(101, seed=5)], seed=1).driving()
+    others = [camera.driving(), novice, kernel_net(101, 16, seed=4)]
+    for k in range(3):
+        for network in others:
+            network.act(noise(101, k))
+        assert len(looked) == k + 1
+
+
+def test_a_picture_that_changes_in_its_place_is_seen_anew():
+    network, seen = camera_net(16, seed=4).driving(), noise(101)
+    before = network.act(seen)
+    seen.image[:] = 1.0 - seen.image
+    after = network.act(seen)
+    assert after == camera_net(16, seed=4).driving().act(Features(image=seen.image.copy()))
+    assert after != before
+
+
+def test_threads_that_ask_at_once_do_not_disturb_each_other():
+    networks = [camera_net(16, seed=4).driving() for _ in range(2)]  # with one trunk between them
+    expected = [networks[0].act(noise(101, seed)) for seed in range(4)]
+    wrong = []
+
+    def ask(network):
+        wrong.extend(k for k in range(400) if network.act(noise(101, k % 4)) != expected[k % 4])
+
+    threads = [Thread(target=ask, args=[network]) for network in networks]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    assert not wrong
+
+
+@pytest.mark.parametrize(
+    ("kind", "shapes", "filters"),
+    [
+        ("camera", {"scan": (101,)}, 16),
+        ("camera", {"image": (32, 32)}, 0),
+        ("fusion", {}, 16),
+        ("fusion", {"smell": (3,)}, 16),
+        ("camera", {"image": (32, 32), "scan": (101,)}, 16),
+    ],
+)
+def test_what_cannot_be_is_no_architecture(kind, shapes, filters):
+    with pytest.raises(ValueError):
+        Architecture(kind, shapes, filters)
+
+
+@pytest.mark.parametrize(
+    "network", [camera_net(4), lidar_net(9), fusion_net(9, 4), EnsembleNet(fusion_net(9, 4), 2, 0)]
+)
+def test_an_architecture_knows_the_weights_of_what_trains(network):
+    assert network.architecture.weights == {name: tuple(each.shape) for name, each in network.state_dict().items()}
+
+
+BLOCKED = """
+import sys
+
+class Blocked:
+    def find_spec(self, name, path=None, target=None):
+        if name.split(".")[0] in ("torch", "pybullet", "joblib", "matplotlib", "pygame"):
+            raise AssertionError(f"{name} is imported")
+
+sys.meta_path.insert(0, Blocked())
+import lira.tools.runs.alone, lira.tools.verbs.drive
+from lira.fusion.experts.load import load_alone
+from lira.hal.profile import load_profile
+import numpy as np, lira
+seen = lira.Features(scan=np.ones(101, np.float32), image=np.ones((32, 32), np.float32))
+for policy in ("camera-expert", "lidar-expert"):
+    print(load_alone(policy, load_profile("thesis-sim"), shield=True).propose(seen).choice.driver)
+"""
+
+
+def test_driving_needs_neither_torch_nor_a_simulator():
+    done = subprocess.run([sys.executable, "-c", BLOCKED], capture_output=True, text=True, timeout=60, check=False)
+    assert (done.stdout.split(), done.stderr) == (["camera", "lidar"], "")

@@ -1,0 +1,76 @@
+"""What is reached over the bus beside a robot's sensors: the truth about a twin, and what a person asks."""
+
+import argparse
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+
+import msgspec
+
+from lira.fusion.operator_service import RequestLine
+from lira.hal.bus.bus import Bus
+from lira.hal.bus.topics import DECISION
+from lira.hal.client.arena import WiredArena
+from lira.hal.client.remote import RemoteArena, RemoteRobot
+from lira.hal.errors import ConfigError
+from lira.hal.messages import Decision, Episode
+from lira.hal.port import Arena
+from lira.sim_backend.world import World
+from lira.tools.launch.lifetime import CLOSE_S
+
+FLOOR = "floor"  # the world of a robot that is in none of ours
+NO_TWIN = "Here, a person teaches (--teacher none), and a policy drives without --unseen."
+
+
+@contextmanager
+def arena_of(args: argparse.Namespace, robot: RemoteRobot) -> Iterator[tuple[Arena, World]]:
+    """Reach into the twin behind a robot, or behind its devices. Raises `ConfigError` for a robot that is none."""
+    if args.arena is None:
+        remote = RemoteArena(robot)
+        yield remote, _world(remote.info)
+        return
+    bus = Bus(args.name, connect=args.arena)
+    try:
+        wired = WiredArena(bus, robot)
+        yield wired, _world(wired.info)
+    finally:
+        bus.close(CLOSE_S)
+
+
+def _world(info: bytes) -> World:
+    world = msgspec.json.decode(info, type=World | None)
+    if world is None:
+        raise ConfigError("only a twin has layouts to drive, and shows a teacher where the robot is", NO_TWIN)
+    return world
+
+
+@contextmanager
+def request_line(robot: RemoteRobot, args: argparse.Namespace) -> Iterator[RequestLine]:
+    """Listen to what a person asks."""
+    watch = Bus(args.name, connect=args.connect, watch=True)
+    try:
+        yield RequestLine(robot.bus, watch, robot.now)
+    finally:
+        watch.close(CLOSE_S)
+
+
+def restarter(robot: RemoteRobot, args: argparse.Namespace) -> Callable[[], None] | None:
+    """Return what puts a twin's robot back to the start; None for a real robot."""
+    arena = RemoteArena(robot)
+    return None if world_of(robot) == FLOOR else lambda: arena.reset(Episode(args.layout))
+
+
+def world_of(robot: RemoteRobot) -> str:
+    """Return the name of a twin's world; `FLOOR` for a real robot."""
+    world = msgspec.json.decode(robot.info.arena, type=World | None)
+    return FLOOR if world is None else world.name
+
+
+def decisions_of(robot: RemoteRobot) -> Callable[[Decision], None]:
+    """Return what puts decisions on the bus."""
+    topic = robot.bus.publisher(DECISION)
+    return lambda decision: topic.put(decision, robot.now())
+
+
+def say(line: str) -> None:
+    """Print a line at once."""
+    print(line, flush=True)
