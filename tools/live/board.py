@@ -8,7 +8,7 @@ from lira.fusion.log.counts import Ledger
 from lira.fusion.log.run_log import LapRecord
 from lira.fusion.teaching.session import Tally
 from lira.hal.messages import SessionState, Stage
-from lira.tools.runs.teach import Say
+from lira.tools.runs.progress import Say
 
 REPORT_S = 0.5
 CURVE = 100  # laps

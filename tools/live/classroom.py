@@ -18,7 +18,8 @@ from lira.hal.messages import Decision, Driver
 from lira.hal.profile import RobotProfile
 from lira.tools.runs.build import NewTrainer, build_method
 from lira.tools.runs.folder import LABELS, RECORD, snapshot
-from lira.tools.runs.teach import Plan, Say
+from lira.tools.runs.progress import Say
+from lira.tools.runs.teach import Plan
 
 
 class Classroom:

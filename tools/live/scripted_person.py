@@ -6,13 +6,16 @@ HOST:PORT WORLD LAYOUT SPEED SKILL SEED.
 """
 
 import itertools
+import math
 import signal
 import sys
 import threading
 import time
 from collections.abc import Sequence
+from dataclasses import replace
 
 import torch
+from msgspec import structs
 
 from lira.fusion.experts.tasks import task_of
 from lira.fusion.methods.base import STAND, Choice, Expert, Policy, Proposal
@@ -117,6 +120,17 @@ class Person:
         return act
 
 
+def ahead(state: CourseState, lag_s: float) -> CourseState:
+    """Where the robot is when what is decided now takes hold: a person reckons with that."""
+    way_m, yaw_rad = state.linear_m_s * lag_s, state.yaw_rad + 0.5 * state.angular_rad_s * lag_s
+    return replace(
+        state,
+        x_m=state.x_m + way_m * math.cos(yaw_rad),
+        y_m=state.y_m + way_m * math.sin(yaw_rad),
+        yaw_rad=state.yaw_rad + state.angular_rad_s * lag_s,
+    )
+
+
 def live(client: TeleopClient, watch: Bus, person: Person, thumb: Thumb, speed: float, stop: threading.Event) -> None:
     """Look and act, a period at a time, until the session is over; end it once it has passed."""
     states, decisions, sessions = watch.reader(SIM_STATE), watch.reader(DECISION), watch.reader(SESSION)
@@ -139,7 +153,8 @@ def live(client: TeleopClient, watch: Bus, person: Person, thumb: Thumb, speed: 
                 client.ask(OperatorRequest(Request.FINISH), time.monotonic())
             asked, thumb.action = True, None
             continue
-        thumb.action = person.act(state.message, decision.message if fresh and decision else None, told)
+        lag_s = (time.monotonic() - state.arrived_s) * speed + client.profile.period_s / 2
+        thumb.action = person.act(ahead(state.message, lag_s), decision.message if fresh and decision else None, told)
 
 
 def main() -> int:
@@ -152,7 +167,9 @@ def main() -> int:
     bus, watch = Bus(name, connect=endpoint), Bus(name, connect=endpoint, watch=True)
     client = TeleopClient(bus, watch, ANSWER_S)
     foresight = Foresight(client.profile, load_world(world), int(layout))
-    teacher = ScriptedTeacher(foresight, client.profile, TEACHERS[skill], int(seed))
+    teacher = ScriptedTeacher(
+        foresight, client.profile, structs.replace(TEACHERS[skill], style="proportional"), int(seed)
+    )
     experts = [expert for _, expert in load_pair(client.profile, task_of(world))]
     person, thumb = Person(teacher, experts), Thumb(client, float(speed))
     thread = threading.Thread(target=thumb.run, args=[stop], name="thumb")

@@ -40,7 +40,7 @@ from lira.tools.live.lap import Fate, count, fate, is_helped
 from lira.tools.live.requests import TAUGHT, reply
 from lira.tools.live.verdict import has_passed, judged_words, verdict_words
 from lira.tools.runs.course import Course
-from lira.tools.runs.teach import Say
+from lira.tools.runs.progress import Say
 
 
 @dataclass(frozen=True, slots=True)

@@ -21,9 +21,10 @@ from lira.tools.live.hand import Hand
 from lira.tools.live.session import LiveSession, Rules
 from lira.tools.operator.voice import explain
 from lira.tools.runs.course import Course
-from lira.tools.runs.folder import FLOOR, LABELS, RECORD, in_the_log
-from lira.tools.runs.teach import Plan, Say
-from lira.tools.runs.with_person import request_line
+from lira.tools.runs.folder import LABELS, RECORD, in_the_log
+from lira.tools.runs.progress import Say
+from lira.tools.runs.reach import FLOOR, request_line
+from lira.tools.runs.teach import Plan
 
 
 @dataclass(frozen=True, slots=True)

@@ -10,7 +10,7 @@ examples:
   lira teach --as ada --speed 0.5                      at half speed, for the first time
   lira teach --as ada --run runs/teach-ada             go on another day: labels and counts go on
   lira teach --connect 192.168.1.20:7447 --as ada      a robot that is there
-  lira teach --world line-obstacles --person scripted  a script drives by teleop as a hand would, at 3 times real time
+  lira teach --world line-obstacles --person scripted  a script drives by teleop as a hand would, at 2.5 times real time
 
 exit status: 0 if the newest proof was passed, or none was asked for; 1 if it was not; 2 if something went wrong
 """
@@ -31,7 +31,7 @@ from lira.tools.options import DEFAULT, add_expert, add_layout, add_seed, natura
 if TYPE_CHECKING:
     from lira.tools.runs.teach import Plan
 
-SCRIPT_SPEED = 3.0
+SCRIPT_SPEED = 2.5
 READY_S = 90.0
 NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_-]{0,31}")
 
@@ -62,7 +62,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add("--connect", metavar="HOST:PORT", help="teach the robot or the twin that is there, instead of starting a twin")
     add("--name", default="rosbot", help=f"the robot's name on the bus {DEFAULT}")
     add("--listen", default="127.0.0.1:7447", metavar="HOST:PORT", help=f"where the twin listens {DEFAULT}")
-    add("--speed", type=_speed, help="of the twin, times real time (default: 1; with a scripted person 3)")
+    add("--speed", type=_speed, help="of the twin, times real time (default: 1; with a scripted person 2.5)")
     add("--method", default="plus", help=f"way of teaching, as in `lira fusion` {DEFAULT}")
     add("--practice", type=float, metavar="S", help="seconds of driving before it counts (default: 15, scripted: 2)")
     add("--unseen", type=natural, default=3, help=f"layouts that the novice has not seen, to prove itself {DEFAULT}")
