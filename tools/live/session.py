@@ -45,11 +45,15 @@ from lira.tools.runs.progress import Say
 
 @dataclass(frozen=True, slots=True)
 class Rules:
-    """`practice_s` of driving come first. `person` is who teaches. At most so many `laps` are taught."""
+    """`practice_s` of driving come first. `person` is who teaches. At most so many `laps` are taught, and
+    for so many `minutes`; with those a proof that was passed ends the session, unless it takes the `whole_time`.
+    """
 
     practice_s: float = 0.0
     person: str = ""
     laps: int = 100
+    minutes: float | None = None
+    whole_time: bool = False
 
 
 class LiveSession:
@@ -102,7 +106,10 @@ class LiveSession:
             unaided = lap is not None and lap.passed and lap.unassisted and self._course is not None
             if self._novice.trained and (self._asked is Request.PROVE or unaided):
                 self._prove()
-                self._await_word()
+                if self._rules.minutes is None:
+                    self._await_word()
+                elif self.converged and not self._rules.whole_time:
+                    break
         self._show(Stage.OVER)
 
     def result(self) -> ResultRecord:
@@ -133,7 +140,13 @@ class LiveSession:
         return self._classroom.method.novice
 
     def _is_over(self) -> bool:
-        return self.stop.is_set() or self._asked is Request.FINISH
+        return self.stop.is_set() or self._asked is Request.FINISH or self._is_late()
+
+    def _is_late(self) -> bool:
+        """Whether the time for teaching is up; a proof that was begun is driven to its end."""
+        minutes, stage = self._rules.minutes, self.board.stage
+        taught = stage not in (Stage.PRACTICE, Stage.READY, Stage.PROVING, Stage.JUDGING)
+        return minutes is not None and taught and self._robot.now() > self._began_s + 60.0 * minutes
 
     # The stages
 
@@ -161,6 +174,7 @@ class LiveSession:
         while not self._is_over() and not self._hand.holds:
             self._idle()
         self._was_there = True
+        self._began_s = self._robot.now()
 
     def _teach(self) -> LapRecord | None:
         """A lap of teaching; None if it was cut off."""

@@ -67,6 +67,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add("--practice", type=float, metavar="S", help="seconds of driving before it counts (default: 15, scripted: 2)")
     add("--unseen", type=natural, default=3, help=f"layouts that the novice has not seen, to prove itself {DEFAULT}")
     add("--laps", type=natural, default=100, help=f"end after so many laps of teaching {DEFAULT}")
+    add("--minutes", type=float, metavar="M", help="end after so many minutes of teaching (default: when you end it)")
+    add("--whole-time", action="store_true", help="with --minutes: go on though the novice has passed")
     add("--idle-frames", choices=("label", "skip"), default="skip", help=f"steps with the stick at rest {DEFAULT}")
     add("--experts", metavar="PAIR", help="whose experts, as in `lira fusion`")
     add_expert(parser)
@@ -96,7 +98,9 @@ def run(args: argparse.Namespace) -> int:
     torch.set_num_threads(1)
     args.speed = args.speed or (SCRIPT_SPEED if scripted else 1.0)
     practice_s = args.practice if args.practice is not None else 2.0 if scripted else 15.0
-    rules = Rules(practice_s=practice_s, person=args.who, laps=args.laps)
+    rules = Rules(
+        practice_s=practice_s, person=args.who, laps=args.laps, minutes=args.minutes, whole_time=args.whole_time
+    )
     with contextlib.ExitStack() as stack:
         stack.enter_context(robot_of(args))
         robot = stack.enter_context(connect(args.connect, args.name, close_s=CLOSE_S))
