@@ -12,6 +12,7 @@ import pytest
 
 from lira.hal.bus.bus import Bus
 from lira.hal.bus.topics import APPLIED, INFO, OPERATOR, OPERATOR_ANSWER
+from lira.hal.errors import ConfigError
 from lira.hal.messages import (
     STOP,
     Applied,
@@ -48,6 +49,7 @@ os.environ["SDL_VIDEODRIVER"] = os.environ["SDL_AUDIODRIVER"] = "dummy"
 pygame = pytest.importorskip("pygame", reason="needs pygame: pip install 'lira-rosbot[console]'")
 from lira.tools.console.draw import BANNER, SIGNS, SIZE, draw, draw_voice, fan  # noqa: E402
 from lira.tools.console.palette import AMBER, GREEN, PANEL, RED, SKY  # noqa: E402
+from lira.tools.console.screen import check_screen, fitted, window_size  # noqa: E402
 from lira.tools.console.window import Keyboard  # noqa: E402
 
 SCAN = LaserScan(1.0, -math.pi / 2, math.pi / 4, 0.1, 4.0, np.array([1.0, math.inf, 2.0, math.nan, 1.0], np.float32))
@@ -353,3 +355,28 @@ def test_a_screenshot_that_cannot_be_written_is_an_error_of_two_lines(tmp_path):
     with ChildProcess("the console", lira_command("console", "--screenshot", str(path)), tmp_path / "log") as console:
         assert console.wait(60.0) == 2, console.output()
         assert console.output().splitlines()[0] == f"lira console: cannot write {path}"
+
+
+@pytest.mark.parametrize(
+    ("window", "box"),
+    [
+        ((1280, 680), (0, 0, 1280, 680)),
+        ((800, 480), (0, 27, 800, 425)),
+        ((1024, 600), (0, 28, 1024, 544)),
+        ((3840, 2160), (0, 60, 3840, 2040)),
+    ],
+)
+def test_the_console_is_whole_on_any_screen(window, box):
+    assert tuple(fitted(SIZE, window)) == pytest.approx(box, abs=1)
+
+
+def test_it_begins_no_larger_than_the_desktop():
+    assert window_size(SIZE, (1366, 768)) == SIZE
+    assert window_size(SIZE, (800, 480)) == (800, 425)
+
+
+def test_nobody_looks_at_a_console_without_a_screen():
+    check_screen("x11", None)
+    check_screen("dummy", "dummy")
+    with pytest.raises(ConfigError, match="lira web"):
+        check_screen("offscreen", None)

@@ -24,7 +24,7 @@ from lira.tools.console.palette import (
 from lira.tools.console.picture import pixels_of
 from lira.tools.operator.situation import Urgency
 from lira.tools.operator.view import LOW_V, STALE_S, View, battery_share
-from lira.tools.operator.voice import Voice, speak, verdict
+from lira.tools.operator.voice import Voice, progress_words, speak, verdict
 
 SIZE = (1280, 680)  # fits a screen of 1366 by 768 with a desktop's bar and a window's frame
 # How loud a situation is, by colour, by the colour of the letters and by shape (corners of the sign; 0: a bar alone).
@@ -180,7 +180,7 @@ def draw_activation(surface: pygame.Surface, box: pygame.Rect, expert: ExpertVie
 
 def draw_counts(surface: pygame.Surface, box: pygame.Rect, view: View) -> None:
     """Labels, interventions, calls and training so far."""
-    panel(surface, box, "so far")
+    panel(surface, box, "so far" if view.teaching is None else progress_words(view.teaching))
     if view.decision is None:
         return
     d, labels = view.decision, view.decision.labels
@@ -208,6 +208,7 @@ def draw_operator(surface: pygame.Surface, box: pygame.Rect, view: View) -> None
     write(surface, prefix + words, (box.x + 26, box.y + 8), 24, DIM if accepted is None else TEXT)
     names = () if view.decision is None else (expert.name for expert in view.decision.experts)
     keys = ["P " + ("go on" if view.paused else "pause"), "S save", "R held: new episode"]
+    keys += ["V prove it", "U held: undo"] if view.teaching is not None else []
     keys += [f"{number} {name} drives" for number, name in enumerate(names, start=1)]
     write(surface, "    ".join(keys), (box.x + 26, box.y + 32), 20, DIM)
 

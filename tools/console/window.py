@@ -13,6 +13,7 @@ from lira.hal.messages import Request
 from lira.tools.console import sound
 from lira.tools.console.draw import SIZE, draw
 from lira.tools.console.keyboard import keyboard_mapping, pad_of
+from lira.tools.console.screen import check_screen, show_fitted, window_size
 from lira.tools.joystick.axes import PadState
 from lira.tools.joystick.client import TeleopClient
 from lira.tools.joystick.deadman import Hand, State
@@ -107,7 +108,10 @@ def show(look: Callable[[], View], keyboard: Keyboard | None, stop: threading.Ev
     pygame.font.init()
     sounds = load_sounds()
     try:
-        screen = pygame.display.set_mode(SIZE, pygame.RESIZABLE | pygame.SCALED)
+        check_screen(pygame.display.get_driver(), os.environ.get("SDL_VIDEODRIVER"))
+        desktop = pygame.display.get_desktop_sizes()[0]
+        screen = pygame.display.set_mode(window_size(SIZE, desktop), pygame.RESIZABLE)
+        picture = pygame.Surface(SIZE, depth=32)
         pygame.display.set_caption("lira console")
         pressed: frozenset[str] = frozenset()
         loud, due_s = Urgency.CALM, time.monotonic()
@@ -131,7 +135,8 @@ def show(look: Callable[[], View], keyboard: Keyboard | None, stop: threading.Ev
             if urgency is not loud and urgency in sounds:
                 sounds[urgency].play()
             loud = urgency
-            draw(screen, view)
+            draw(picture, view)
+            show_fitted(screen, picture)
             pygame.display.flip()
             due_s = max(due_s + 1.0 / FPS, time.monotonic())
             time.sleep(max(0.0, due_s - time.monotonic()))

@@ -2,7 +2,8 @@
 
 It only looks, in a process of its own: closing it changes nothing. Without a gamepad the keyboard drives: hold SPACE
 and use the arrows (SHIFT: full speed), Esc is the emergency stop, F1 held for a second releases it. P pauses driving
-and learning and goes on, S saves, R held for a second begins a new episode, 1 to 4 give control to an expert.
+and learning and goes on, S saves, R held for a second begins a new episode, 1 to 4 give control to an expert. In a
+session (lira teach) V asks for the proof, and U held for a second takes the last intervention's labels back.
 
 examples:
   lira console
