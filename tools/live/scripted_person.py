@@ -14,10 +14,10 @@ import time
 from collections.abc import Sequence
 from dataclasses import replace
 
-import torch
 from msgspec import structs
 
 from lira.fusion.experts.tasks import task_of
+from lira.fusion.inference.threads import one_thread
 from lira.fusion.methods.base import STAND, Choice, Expert, Policy, Proposal
 from lira.fusion.methods.lira import in_consensus
 from lira.fusion.preprocess import Features
@@ -159,7 +159,7 @@ def live(client: TeleopClient, watch: Bus, person: Person, thumb: Thumb, speed: 
 
 def main() -> int:
     """Teach until the session passed, then end it."""
-    torch.set_num_threads(1)
+    one_thread()
     name, endpoint, world, layout, speed, skill, seed = sys.argv[1:8]
     stop = threading.Event()
     signal.signal(signal.SIGTERM, lambda *_: stop.set())

@@ -44,9 +44,11 @@ def run(args: argparse.Namespace) -> int:
     """Hold blocks, or analyse them."""
     import torch
 
+    from lira.fusion.inference.threads import one_thread
     from lira.tools.study.plan import load_plan
 
     torch.set_num_threads(1)
+    one_thread()
     plan = load_plan(args.plan)
     folder: Path = args.to or Path("runs") / f"study-{args.plan.stem}{'-dry' if args.dry_run else ''}"
     if args.dry_run:

@@ -87,6 +87,7 @@ def run(args: argparse.Namespace) -> int:
     """Hold the session, and leave a report."""
     import torch
 
+    from lira.fusion.inference.threads import one_thread
     from lira.hal.client.remote import connect
     from lira.tools.launch.lifetime import CLOSE_S
     from lira.tools.live.session import Rules
@@ -96,6 +97,7 @@ def run(args: argparse.Namespace) -> int:
     args.run = args.run or Path("runs") / f"teach-{args.who}-{datetime.now():%Y%m%d-%H%M%S}"
     plan = plan_of(args)
     torch.set_num_threads(1)
+    one_thread()
     args.speed = args.speed or (SCRIPT_SPEED if scripted else 1.0)
     practice_s = args.practice if args.practice is not None else 2.0 if scripted else 15.0
     rules = Rules(
