@@ -54,7 +54,7 @@ def to_action(twist: Twist, base: Base) -> Action:
 class ControlLoop:
     """Runs a method on a robot at the profile's control rate, on the robot's own clock."""
 
-    def __init__(self, robot: Robot, truth: Callable[[], CourseState] | None = None) -> None:
+    def __init__(self, robot: Robot, truth: Callable[[], CourseState | None] | None = None) -> None:
         self._robot = robot
         self._truth = truth
         self._base = robot.profile.base
@@ -89,7 +89,7 @@ class ControlLoop:
             self._stand(observation)
             return None
         proposal = self._propose(method, features)
-        state = None if self._truth is None else self._truth()
+        state = self.truth()
         if teacher is not None and state is not None:
             offers = method.offers if isinstance(method, Chooser) else {}
             answer = teacher.act(state, proposal, self._driving_policy(method, proposal), offers)
@@ -100,6 +100,10 @@ class ControlLoop:
         lesson = self._learn(method, proposal, applied)
         self._keep_time()
         return Step(observation, proposal, applied, lesson, state)
+
+    def truth(self) -> CourseState | None:
+        """Where the robot really is; None where nobody knows."""
+        return None if self._truth is None else self._truth()
 
     def restarted(self) -> bool:
         """Whether the robot was started anew since this was asked last: it stands, and its clock is another one.

@@ -17,6 +17,10 @@ from lira.hal.errors import LiraError
 from lira.hal.messages import OperatorAnswer, OperatorRequest, Request
 
 DEPTH = 16
+ONLY_IN_A_SESSION = frozenset({Request.PROVE, Request.PASSED, Request.FAILED, Request.UNDO, Request.FINISH})
+
+Answer = tuple[bool, str]
+"""Whether a request was accepted, and what to say about it."""
 
 Job = Callable[[], str]
 """Work beside the loop that ends with what to say about it. Raises `LiraError`."""
@@ -47,7 +51,8 @@ class OperatorService:
     """Does what is asked between two steps of `loop`. `paused` and `episode` are what the service goes by.
 
     `restart` puts a twin's robot back to the start; None on a real floor. `snapshot` takes what is to be saved as it is
-    now and returns the writing of it, which is done aside; None where nothing is learned.
+    now and returns the writing of it, which is done aside; None where nothing is learned. `session` is asked first: it
+    answers what it takes, None to the rest.
     """
 
     def __init__(
@@ -60,6 +65,7 @@ class OperatorService:
         *,
         restart: Callable[[], None] | None = None,
         snapshot: Callable[[], Job] | None = None,
+        session: Callable[[OperatorRequest], Answer | None] = lambda _: None,
     ) -> None:
         self.paused = False
         self.episode = 0
@@ -71,6 +77,7 @@ class OperatorService:
         self._say = say
         self._restart = restart
         self._snapshot = snapshot
+        self._session = session
         self._clerk = ThreadPoolExecutor(max_workers=1, thread_name_prefix="save")
         self._saving: Future[str] | None = None
         self._count = 0
@@ -96,7 +103,12 @@ class OperatorService:
         if self._saving is not None:
             self._end_saving(self._saving)
 
-    def _do(self, asked: OperatorRequest) -> tuple[bool, str]:
+    def _do(self, asked: OperatorRequest) -> Answer:
+        taken = self._session(asked)
+        if taken is not None:
+            return taken
+        if asked.request in ONLY_IN_A_SESSION:
+            return False, "only a session of teaching can: lira teach"
         if asked.request is Request.PAUSE:
             self.paused = True
             return True, "paused: the robot stands unless a hand drives, and nothing is learned"
@@ -109,7 +121,7 @@ class OperatorService:
             return self._reset()
         return self._choose(asked.name)
 
-    def _reset(self) -> tuple[bool, str]:
+    def _reset(self) -> Answer:
         where = "begins here"
         if self._restart is not None:
             self._loop.stand()
@@ -121,6 +133,10 @@ class OperatorService:
         self.episode += 1
         self._begin_anew()
         return True, f"episode {self.episode} {where}"
+
+    def change_method(self, method: Method) -> None:
+        """From now on it is another method that drives."""
+        self._method = method
 
     def _begin_anew(self) -> None:
         """Nothing of what was before belongs to what comes; the robot moves after a neutral command."""

@@ -24,6 +24,7 @@ class Verb(NamedTuple):
 
 VERBS = {
     "demo": Verb("lira.tools.verbs.demo", "teach a robot in the digital twin, from start to report, in minutes"),
+    "teach": Verb("lira.tools.verbs.teach", "teach a robot yourself, from practice to a verdict"),
     "twin": Verb("lira.tools.verbs.twin", "the digital twin: a simulated ROSbot on the bus"),
     "robot": Verb(
         "lira.tools.verbs.robot", "the physical ROSbot: opens its lidar, camera and base, and puts it on the bus"
@@ -43,6 +44,7 @@ VERBS = {
     "console": Verb("lira.tools.verbs.console", "watch the robot learn on a screen"),
     "web": Verb("lira.tools.verbs.web", "watch, teach and drive the robot from a page in the browser"),
     "report": Verb("lira.tools.verbs.report", "make the HTML page of a recorded run"),
+    "study": Verb("lira.tools.verbs.study", "a study with people: orders, blocks, questions, table, analysis"),
     "labels": Verb("lira.tools.verbs.labels", "look through a log of labels for damage, and repair it"),
     "keys": Verb("lira.tools.verbs.keys", "make the keys that say who may drive a robot, and encrypt the bus"),
     "stop-test": Verb(

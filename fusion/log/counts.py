@@ -51,6 +51,24 @@ class Ledger:
         self._choices = 0
         self.new_episode()
 
+    def go_on(self, labels: LabelCounts, interventions: int, calls: int) -> None:
+        """Count on from where another session has ended."""
+        before = ((Driver.HUMAN, "human"), (Driver.MEAN, "expert"))
+        for source, name in before:
+            self._given[source] += getattr(labels, f"given_{name}")
+            self._stored[source] += getattr(labels, f"stored_{name}")
+        self._given[DEMONSTRATION] += labels.demonstration
+        self._stored[DEMONSTRATION] += labels.demonstration
+        self.interventions += interventions
+        self.calls += calls
+
+    def take_back(self, source: str, count: int) -> None:
+        """So many stored labels of a source were taken back; the demonstration's go last."""
+        taken = min(count, self._stored[source])
+        self._stored[source] -= taken
+        if source == Driver.HUMAN:
+            self._stored[DEMONSTRATION] -= min(count - taken, self._stored[DEMONSTRATION])
+
     def new_episode(self) -> None:
         """A run of steps does not go on across a reset."""
         self._last: Choice | None = None

@@ -144,7 +144,15 @@ class ResultRecord(msgspec.Struct, frozen=True, tag="result"):
     contradictions: tuple[ContradictionRecord, ...] = ()
 
 
-Record = RunRecord | StepRecord | LapRecord | ResultRecord
+class VerdictRecord(msgspec.Struct, frozen=True, tag="verdict"):
+    """What a person's session came to: who taught, what was proven in words, and whether the novice passed."""
+
+    person: str
+    words: str
+    passed: bool
+
+
+Record = RunRecord | StepRecord | LapRecord | ResultRecord | VerdictRecord
 
 
 class RunWriter:

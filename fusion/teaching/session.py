@@ -84,6 +84,32 @@ class Tally:
         return self.collisions + self.lost + self.unfinished == 0
 
 
+def lap_record(
+    tally: Tally, phase: Phase, lap: int, layout: int, duration_s: float, journal: Journal, training_steps: int
+) -> LapRecord:
+    """What is written down at the end of a lap."""
+    ledger = journal.ledger
+    return LapRecord(
+        phase=phase,
+        lap=lap,
+        layout=layout,
+        passed=tally.passed,
+        unassisted=tally.human_steps == 0,
+        duration_s=duration_s,
+        collisions=tally.collisions,
+        lost=tally.lost,
+        lateral_rms_m=float(np.sqrt(np.mean(np.square(tally.lateral_m)))) if tally.lateral_m else None,
+        human_labels=ledger.labels.stored_human,
+        interventions=ledger.interventions,
+        calls=ledger.calls,
+        buffer=ledger.buffer,
+        training_steps=training_steps,
+        elapsed_s=journal.elapsed_s,
+        stops=tally.stops,
+        shielded=tally.shielded,
+    )
+
+
 class Session:
     """Teaches one apprentice on one robot.
 
@@ -189,26 +215,8 @@ class Session:
             self._drive(method, drive, phase, lap, teacher, tally)
             if phase == Phase.PROVE and not tally.passed:
                 break
-        ledger = self._journal.ledger
-        record = LapRecord(
-            phase=phase,
-            lap=lap,
-            layout=drives[0].episode.layout,
-            passed=tally.passed,
-            unassisted=tally.human_steps == 0,
-            duration_s=self._robot.now() - began_s,
-            collisions=tally.collisions,
-            lost=tally.lost,
-            lateral_rms_m=float(np.sqrt(np.mean(np.square(tally.lateral_m)))) if tally.lateral_m else None,
-            human_labels=ledger.labels.stored_human,
-            interventions=ledger.interventions,
-            calls=ledger.calls,
-            buffer=ledger.buffer,
-            training_steps=self._training_steps,
-            elapsed_s=self._journal.elapsed_s,
-            stops=tally.stops,
-            shielded=tally.shielded,
-        )
+        duration_s, steps = self._robot.now() - began_s, self._training_steps
+        record = lap_record(tally, phase, lap, drives[0].episode.layout, duration_s, self._journal, steps)
         self._journal.write(record)
         return record
 
@@ -226,7 +234,7 @@ class Session:
                 tally.collisions += 1
                 if phase == Phase.PROVE:
                     return
-                self._begin(_after_crash(drive.episode, self._arena.state(), phase), method, teacher)
+                self._begin(after_crash(drive.episode, self._arena.state(), phase), method, teacher)
                 continue
             self._journal.note(
                 step,
@@ -254,7 +262,7 @@ class Session:
                 tally.lost += state.lost
                 if phase == Phase.PROVE:
                     return
-                self._begin(_after_crash(drive.episode, state, phase), method, teacher)
+                self._begin(after_crash(drive.episode, state, phase), method, teacher)
         out = state.finished or (drive.goal == "leave" and state.lost)
         tally.unfinished += drive.goal != "stay" and not out
         tally.unfinished += bool(abs(np.nan_to_num(state.lateral_m)) > drive.final_lateral_m)
@@ -285,7 +293,7 @@ class Session:
         )
 
 
-def _after_crash(episode: Episode, state: CourseState, phase: Phase) -> Episode:
+def after_crash(episode: Episode, state: CourseState, phase: Phase) -> Episode:
     """Where the robot is put down after a crash to go on with the lap: before it to try again, or behind it."""
     if not np.isfinite(state.progress_m):
         return episode

@@ -26,6 +26,7 @@ from lira.hal.messages import (
     OperatorAnswer,
     OperatorRequest,
     Range,
+    SessionState,
     Twist,
 )
 from lira.hal.messages.codec import fixed_bytes, ros_type_of
@@ -101,6 +102,7 @@ JOY_FEEDBACK = Topic("joy/feedback", JoyFeedback, 10.0, 0.2, REPORT)
 OPERATOR = Topic("operator", OperatorRequest, 5.0, 1.0, REPORT)  # asked later than this counts for nothing
 OPERATOR_ANSWER = Topic("operator/answer", OperatorAnswer, 1.0, 3.0, REPORT, REPORT_BYTES)
 DECISION = Topic("lira/decision", Decision, 5.0, 1.0, REPORT, REPORT_BYTES)
+SESSION = Topic("lira/session", SessionState, 1.0, 3.0, REPORT, REPORT_BYTES)
 DIAGNOSTICS = Topic("diagnostics", DiagnosticArray, 1.0, 3.0, REPORT, REPORT_BYTES)
 SIM_STATE = Topic("sim/state", CourseState, 20.0, 0.3, SENSOR)
 CLOCK = Topic("clock", Clock, 20.0, 0.3, URGENT, fixed_bytes(Clock(0.0)))  # lockstep only: closes an observation
@@ -122,6 +124,7 @@ TOPICS: tuple[Topic[Any], ...] = (
     OPERATOR,
     OPERATOR_ANSWER,
     DECISION,
+    SESSION,
     DIAGNOSTICS,
     SIM_STATE,
     CLOCK,
@@ -136,6 +139,7 @@ FROM_OPERATORS: tuple[Topic[Any], ...] = (
     OPERATOR,
     OPERATOR_ANSWER,
     DECISION,
+    SESSION,
     DIAGNOSTICS,
 )
 

@@ -1,6 +1,15 @@
 """The values that cross modules. Messages that mirror ROS keep its field names."""
 
-from lira.hal.messages.learning import Call, Decision, Driver, ExpertView, LabelCounts, Phase
+from lira.hal.messages.learning import (
+    Call,
+    Decision,
+    Driver,
+    ExpertView,
+    LabelCounts,
+    Phase,
+    SessionState,
+    Stage,
+)
 from lira.hal.messages.motion import (
     HELD,
     NEUTRAL_LIMIT,
@@ -83,7 +92,9 @@ __all__ = [
     "Reason",
     "Request",
     "Seed",
+    "SessionState",
     "Source",
+    "Stage",
     "Twist",
     "TwistStamped",
     "WordArray",

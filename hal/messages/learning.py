@@ -32,6 +32,47 @@ class Phase(StrEnum):
     UNSEEN = "unseen"  # alone, where it was not
 
 
+class Stage(StrEnum):
+    """What a person's session is at (`SessionState`)."""
+
+    PRACTICE = "practice"  # the hand gets to know the robot; nothing is learned
+    READY = "ready"  # nothing drives off before a hand was there
+    DEMONSTRATION = "demonstration"
+    TEACHING = "teaching"
+    PROVING = "proving"  # the novice alone; a twin tells how it went
+    JUDGING = "judging"  # the novice alone; the person says how it went
+    VERDICT = "verdict"  # stop, or go on?
+    OVER = "over"
+
+
+@dataclass(frozen=True, slots=True)
+class SessionState:
+    """How a person's session of teaching goes (`lira/session`): what to do next, and whether it is good already.
+
+    `person` is who teaches and `layout` the twin's, as it is now. Counts go on from day to day; `laps` (of teaching),
+    `passed`, `collisions` and `lost` are of today. `alone` is the share of steps since the demonstration in which no
+    person drove, `curve` the same of each lap. Of `shown` proving laps the novice has passed `proven`. `words` is the
+    newest verdict.
+    """
+
+    stamp_s: float
+    stage: Stage
+    person: str = ""
+    layout: int = 0
+    laps: int = 0
+    passed: int = 0
+    collisions: int = 0
+    lost: int = 0
+    labels: int = 0
+    calls: int = 0
+    answered: int = 0
+    alone: float = 0.0
+    curve: tuple[float, ...] = ()
+    proven: int = 0
+    shown: int = 0
+    words: str = ""
+
+
 @dataclass(frozen=True, slots=True)
 class ExpertView:
     """One expert at one decision: its action, its activation A^i (eq. 1) and whether that made it active."""

@@ -5,11 +5,22 @@ from typing import Any
 
 import numpy as np
 
-from lira.hal.messages import Action, Call, CourseState, Decision, ExpertView, LabelCounts, Phase
+from lira.hal.messages import (
+    Action,
+    Call,
+    CourseState,
+    Decision,
+    ExpertView,
+    LabelCounts,
+    Phase,
+    SessionState,
+    Stage,
+)
 from lira.hal.messages.ros_types import Codec, header, ros, stamp
 
 _COURSE_FIELDS = tuple(CourseState.__dataclass_fields__)[1:]
 _COUNT_FIELDS = tuple(LabelCounts.__dataclass_fields__)
+_SESSION_FIELDS = tuple(SessionState.__dataclass_fields__)[2:]
 
 
 def _course_to(m: CourseState) -> Any:
@@ -67,7 +78,20 @@ def _decision_from(message: Any) -> Decision:
     )
 
 
+def _session_to(m: SessionState) -> Any:
+    values = {name: getattr(m, name) for name in _SESSION_FIELDS}
+    values["curve"] = np.array(m.curve, np.float64)
+    return ros("lira_msgs/msg/SessionState")(header=header(m.stamp_s, ""), stage=str(m.stage), **values)
+
+
+def _session_from(message: Any) -> SessionState:
+    values = {name: getattr(message, name) for name in _SESSION_FIELDS}
+    values["curve"] = tuple(map(float, message.curve))
+    return SessionState(stamp(message), Stage(message.stage), **values)
+
+
 CODECS: dict[type, Codec] = {
     CourseState: Codec("lira_msgs/msg/CourseState", _course_to, _course_from),
     Decision: Codec("lira_msgs/msg/Decision", _decision_to, _decision_from),
+    SessionState: Codec("lira_msgs/msg/SessionState", _session_to, _session_from),
 }

@@ -70,6 +70,11 @@ class Request(StrEnum):
     RESET = "reset"  # a new episode; on a twin from the start
     SAVE = "save"  # all that was learned, to disk, now
     HANDOVER = "handover"  # to the expert that is named
+    PROVE = "prove"  # the novice alone, to see whether it can; asked again: it passed, or the verdict ends the session
+    PASSED = "passed"  # a person's judgement of what the novice just drove
+    FAILED = "failed"
+    UNDO = "undo"  # the labels of the last intervention are taken back
+    FINISH = "finish"  # the session ends
 
 
 @dataclass(frozen=True, slots=True)

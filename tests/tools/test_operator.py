@@ -17,7 +17,9 @@ from lira.hal.messages import (
     OperatorAnswer,
     Reason,
     Request,
+    SessionState,
     Source,
+    Stage,
     Twist,
 )
 from lira.tools.joystick.deadman import State
@@ -48,6 +50,12 @@ def on_course(**words):
     return replace(VIEW, truth=replace(TRUTH, **words), truth_age_s=0.05)
 
 
+def in_session(stage, view=VIEW, **words):
+    return replace(
+        view, session=SessionState(1.0, Stage(stage), "ada", words="It drove 2 of 3"), session_age_s=0.1, **words
+    )
+
+
 NEW = {"training_steps": 0, "labels": LabelCounts()}
 CASES = [
     (replace(VIEW, estop=True), "estop"),
@@ -62,6 +70,18 @@ CASES = [
     (replace(PAUSED, applied=BY_HAND), "person_paused"),
     (PAUSED, "paused"),
     (replace(PAUSED, answer_age_s=9.0), "one_expert"),
+    (in_session("practice"), "practice"),
+    (in_session("practice", applied=BY_HAND), "practice"),
+    (in_session("ready"), "ready"),
+    (in_session("proving"), "proving"),
+    (in_session("judging"), "judging"),
+    (in_session("judging", held(Reason.STALE)), "stale"),
+    (in_session("verdict"), "verdict"),
+    (replace(in_session("verdict"), session_age_s=9.0), "one_expert"),
+    (in_session("teaching"), "one_expert"),
+    (in_session("teaching", applied=BY_HAND), "person"),
+    (in_session("teaching", on_course(collided=True)), "one_expert"),
+    (in_session("verdict", PAUSED), "paused"),
     (on_course(collided=True), "collided"),
     (on_course(lost=True), "strayed"),
     (on_course(finished=True), "finished"),
@@ -111,7 +131,7 @@ def test_every_reason_of_the_governor_has_a_situation():
 def test_every_language_has_words_for_every_situation(language):
     words = vocabulary(language)
     assert set(words) == set(Situation)
-    known = {"expert", "age", "lost"}
+    known = {"expert", "age", "lost", "verdict"}
     for said in words.values():
         for line in (said.who, said.why, said.now):
             assert line

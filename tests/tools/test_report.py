@@ -58,13 +58,14 @@ def test_the_page_is_well_formed_and_has_every_part(page_text):
     page = Page(page_text)
     assert page.headings == [
         "Laps",
+        "What it asked of the person",
         "Where it drove",
         "Who drove when",
         "What it learned from",
         "What it saw when it called",
     ]
     assert page.count["svg"] == 6 + 7 + 2  # views: 2 training, 1 proving, 3 unseen; strips: 7 laps; densities: 2
-    assert page.count["tr"] == 1 + 7
+    assert page.count["tr"] == 1 + 7 + 1 + 2  # laps; what two training laps asked of the person
 
 
 def test_the_page_loads_nothing_from_elsewhere(page_text):

@@ -46,7 +46,7 @@ class Bed:
         self.seat, self.hand = Seat(), NoHand()
         self.access = Access(open_here=open_here, hosts=own_names("127.0.0.1"))
         look = lambda: View("rosbot", picture=CompressedImage(0.0, PICTURE), picture_age_s=0.0)  # noqa: E731
-        settings = lambda language: settings_of(INFO, "rosbot", 0, language)  # noqa: E731
+        settings = lambda language, layout=None: settings_of(INFO, "rosbot", 0, language, layout)  # noqa: E731
         self.page = PageServer(look, self.seat, self.access, self.hand, settings, say=lambda _: None)
 
     async def __aenter__(self):

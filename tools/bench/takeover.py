@@ -1,6 +1,7 @@
 """From the press of the dead-man to `cmd_vel/applied`, on loopback, while a policy drives.
 
-The robot runs in a process of its own; the pad is a pipe that carries what the kernel would send. A sample ends when
+The robot runs in a process of its own. `pad`: a pipe that carries what the kernel would send; `web`: a client at the
+socket of `lira web`, a process of its own, that says what a page says, as often as a page does. A sample ends when
 the robot's word that the hand drives has arrived back here, so it counts the way there and the way back.
 """
 
@@ -15,6 +16,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from tempfile import TemporaryDirectory
+from typing import Protocol
 
 import numpy as np
 
@@ -25,7 +27,7 @@ from lira.hal.client.remote import RemoteRobot
 from lira.hal.errors import BusError
 from lira.hal.messages import HELD, STOP, Applied, Command, Source, Twist
 from lira.tools.bench import Row
-from lira.tools.bench.parts import null_robot
+from lira.tools.bench.parts import null_robot, page
 from lira.tools.joystick.axes import AxisRange, PadEvent, PadState
 from lira.tools.joystick.bridge import Bridge
 from lira.tools.joystick.client import TeleopClient
@@ -43,6 +45,16 @@ POLL_S = 0.0005
 REPORT = struct.Struct("<HHi")
 
 
+class Thumb(Protocol):
+    """What takes control, by whatever way."""
+
+    def press(self) -> None:
+        """Hold the dead-man, and drive ahead."""
+
+    def let_go(self) -> None:
+        """Give control back."""
+
+
 class PipePad:
     """A pad at the end of a pipe."""
 
@@ -58,6 +70,14 @@ class PipePad:
     def send(self, *events: tuple[int, int, int]) -> None:
         """One report, as a thumb would cause it."""
         os.write(self._write_fd, b"".join(REPORT.pack(*event) for event in (*events, (EV_SYN, 0, 0))))
+
+    def press(self) -> None:
+        """Hold the dead-man, and the stick ahead."""
+        self.send((EV_ABS, AXES["ABS_Y"], 0), (EV_KEY, BUTTONS[self.mapping.dead_man], 1))
+
+    def let_go(self) -> None:
+        """Off the dead-man, with the stick at rest."""
+        self.send((EV_ABS, AXES["ABS_Y"], 128), (EV_KEY, BUTTONS[self.mapping.dead_man], 0))
 
     def fileno_list(self) -> list[int]:
         """What to wait for."""
@@ -83,30 +103,40 @@ class PipePad:
 
 
 def run() -> list[Row]:
-    """Return one row."""
+    """Return a row for the pad and one for the page."""
     port = free_port()
     name, endpoint = f"bench_{port}", f"127.0.0.1:{port}"
     robot = [sys.executable, "-m", "lira.tools.bench.parts.null_robot", name, endpoint]
     with TemporaryDirectory() as folder, ChildProcess("the robot", robot, Path(folder) / "lira.robot.log") as server:
         server.wait_ready(null_robot.READY, READY_S)
-        taken_ms = measure(name, endpoint)
+        pad = PipePad()
+        with policy(name, endpoint):
+            with bridge(name, endpoint, pad):
+                by_pad = measure(name, endpoint, pad)
+            with page.page_of(name, endpoint, Path(folder)) as thumb:
+                by_page = measure(name, endpoint, thumb)
+    return [row("pad", by_pad), row("web", by_page)]
+
+
+def row(by: str, taken_ms: list[float]) -> Row:
+    """What it takes by one way."""
     p50, p99 = (float(np.percentile(taken_ms, q)) for q in (50, 99))
-    return [{"samples": len(taken_ms), "p50_ms": p50, "p99_ms": p99, "max_ms": max(taken_ms)}]
+    return {"by": by, "samples": len(taken_ms), "p50_ms": p50, "p99_ms": p99, "max_ms": max(taken_ms)}
 
 
-def measure(name: str, endpoint: str) -> list[float]:
+def measure(name: str, endpoint: str, thumb: Thumb) -> list[float]:
     """Take control from a driving policy and give it back, again and again, at moments without a rhythm."""
-    pad, rng = PipePad(), random.Random(0)
+    rng = random.Random(0)
     taken_ms: list[float] = []
     missed = 0
-    with policy(name, endpoint), bridge(name, endpoint, pad), bus_of(name, endpoint, watch=True) as bus:
+    with bus_of(name, endpoint, watch=True) as bus:
         applied = bus.reader(APPLIED, depth=64)
         while len(taken_ms) < SAMPLES + WARM_UP:
             until(applied, lambda result: result.source is Source.POLICY and result.twist != STOP)
             time.sleep(rng.uniform(0.02, 0.12))
             applied.poll()
             pressed_s = time.monotonic()
-            pad.send((EV_ABS, AXES["ABS_Y"], 0), (EV_KEY, BUTTONS[pad.mapping.dead_man], 1))
+            thumb.press()
             try:
                 arrived_s = until(applied, lambda result: result.source is Source.TELEOP and result.twist != STOP)
             except BusError:  # a busy machine stopped the robot, which now waits for a stick at rest
@@ -115,7 +145,7 @@ def measure(name: str, endpoint: str) -> list[float]:
                     raise
             else:
                 taken_ms.append(1e3 * (arrived_s - pressed_s))
-            pad.send((EV_ABS, AXES["ABS_Y"], 128), (EV_KEY, BUTTONS[pad.mapping.dead_man], 0))
+            thumb.let_go()
     return taken_ms[WARM_UP:]
 
 

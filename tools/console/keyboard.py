@@ -17,6 +17,8 @@ KEYS = {
     "p": "BTN_WEST",
     "s": "BTN_NORTH",
     "r": "BTN_EAST",
+    "v": "BTN_SOUTH",
+    "u": "BTN_THUMBL",
     "1": "BTN_DPAD_UP",
     "2": "BTN_DPAD_RIGHT",
     "3": "BTN_DPAD_DOWN",

@@ -35,6 +35,8 @@ KEYS = {
     pygame.K_p: "p",
     pygame.K_s: "s",
     pygame.K_r: "r",
+    pygame.K_v: "v",
+    pygame.K_u: "u",
     pygame.K_1: "1",
     pygame.K_2: "2",
     pygame.K_3: "3",

@@ -272,6 +272,8 @@ class Bridge:
             link_age_s=now_s - self._heard_s,
             decision=decisions[-1] if decisions else self._view.decision,
             decision_age_s=now_s - self._decided_s,
+            session=self._client.session,
+            session_age_s=now_s - self._client.session_s,
             answer=self._client.answer,
             answer_age_s=now_s - self._client.answered_s,
             estop=newest is not None and newest.reason is Reason.ESTOP,
@@ -291,7 +293,7 @@ class Bridge:
 
 def layout_words(mapping: Mapping) -> str:
     """Which control is what on this pad, in a line."""
-    asks = (("pause", mapping.pause), ("save", mapping.save), ("reset", mapping.reset))
+    asks = [(name, getattr(mapping, name)) for name in ("pause", "save", "reset", "prove", "undo")]
     words = [f"dead-man {mapping.dead_man}", f"turbo {mapping.turbo}", f"emergency stop {' or '.join(mapping.estop)}"]
     words += [f"release {mapping.release}", *(f"{what} {name}" for what, name in asks if name)]
     return "its controls: " + ", ".join(words)

@@ -9,7 +9,18 @@ from collections.abc import Callable
 
 from lira.hal.bus.bus import Bus
 from lira.hal.bus.services import LOCKSTEP, info_from_json, press_estop, release_estop
-from lira.hal.bus.topics import APPLIED, DECISION, ESTOP, INFO, JOY, JOY_FEEDBACK, OPERATOR, OPERATOR_ANSWER, TELEOP
+from lira.hal.bus.topics import (
+    APPLIED,
+    DECISION,
+    ESTOP,
+    INFO,
+    JOY,
+    JOY_FEEDBACK,
+    OPERATOR,
+    OPERATOR_ANSWER,
+    SESSION,
+    TELEOP,
+)
 from lira.hal.clock import ClockEstimate
 from lira.hal.errors import BusError
 from lira.hal.messages import (
@@ -22,6 +33,7 @@ from lira.hal.messages import (
     OperatorAnswer,
     OperatorRequest,
     Request,
+    SessionState,
     Twist,
 )
 from lira.hal.profile import RobotProfile
@@ -51,6 +63,7 @@ class TeleopClient:
         self._decisions = watch.reader(DECISION)
         self._requests = bus.publisher(OPERATOR)
         self._answers = watch.reader(OPERATOR_ANSWER, DEPTH)
+        self._sessions = watch.reader(SESSION)
         self._answered = 0
         self._asked: tuple[Request, float] | None = None  # and when, until it is answered
         self.confirmed = False  # that the emergency stop holds which was pressed here: by the robot itself
@@ -68,6 +81,18 @@ class TeleopClient:
     def robot(self) -> str:
         """The robot's name."""
         return self._bus.robot
+
+    @property
+    def session(self) -> SessionState | None:
+        """How a session of teaching goes, as it was heard last."""
+        newest = self._sessions.newest()
+        return None if newest is None else newest.message
+
+    @property
+    def session_s(self) -> float:
+        """When that was heard."""
+        newest = self._sessions.newest()
+        return -math.inf if newest is None else newest.arrived_s
 
     @property
     def paused(self) -> bool:

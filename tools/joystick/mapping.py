@@ -24,7 +24,8 @@ class Mapping(Table, frozen=True):
     """One kind of pad. Controls go by their names in linux/input-event-codes.h; see `pads/ps3.toml` for what each does.
 
     Where a button is asked for, an end of an axis will do, too: "ABS_HAT0Y-" is up on a hat, "ABS_RZ+" a trigger.
-    What `pause`, `reset`, `save` and `experts` (who gets control) ask is not for every pad: they may be left out.
+    What `pause`, `reset`, `save`, `prove`, `undo` and `experts` (who gets control) ask is not for every pad: they may
+    be left out.
     `freeze` says that a live pad of this kind is never silent. `axes` and `buttons` are the order of `joy`.
     """
 
@@ -38,6 +39,8 @@ class Mapping(Table, frozen=True):
     pause: str | None = None
     reset: str | None = None
     save: str | None = None
+    prove: str | None = None
+    undo: str | None = None
     experts: tuple[str, ...] = ()
     dead_zone: Annotated[float, Meta(ge=0.0, le=0.9)] = 0.12
     expo: Share = 0.4
@@ -48,7 +51,7 @@ class Mapping(Table, frozen=True):
 
     def __post_init__(self) -> None:
         """Check the names: raises `ValueError`, which loading turns into a `ConfigError`."""
-        asking = [name for name in (self.pause, self.reset, self.save) if name]
+        asking = [name for name in self.asking if name]
         used = [self.dead_man, self.turbo, *self.estop, self.release, *asking, *self.experts]
         for name in (*used, *self.buttons):
             if not is_control(name):
@@ -62,6 +65,11 @@ class Mapping(Table, frozen=True):
             raise ValueError("an axis that drives cannot serve as a button")
         if self.forward.axis == self.turn.axis:
             raise ValueError("forward and turn must be different axes")
+
+    @property
+    def asking(self) -> tuple[str | None, ...]:
+        """What asks something, but for the experts."""
+        return self.pause, self.reset, self.save, self.prove, self.undo
 
     @property
     def needed_buttons(self) -> frozenset[int]:

@@ -15,7 +15,7 @@ class RequestButtons:
 
     def __init__(self, mapping: Mapping) -> None:
         self._mapping = mapping
-        self._buttons = [name for name in (mapping.pause, mapping.reset, mapping.save) if name] + [*mapping.experts]
+        self._buttons = [name for name in mapping.asking if name] + [*mapping.experts]
         self._since_s: dict[str, float] | None = None  # of what is pressed; inf once it has been asked
 
     def update(
@@ -37,7 +37,7 @@ class RequestButtons:
     def _due(self, now_s: float) -> Iterator[str]:
         assert self._since_s is not None
         for name, since_s in self._since_s.items():
-            if now_s - since_s >= (HOLD_S if name == self._mapping.reset else 0.0):
+            if now_s - since_s >= (HOLD_S if name in (self._mapping.reset, self._mapping.undo) else 0.0):
                 self._since_s[name] = math.inf
                 yield name
 
@@ -45,7 +45,13 @@ class RequestButtons:
         mapping = self._mapping
         if name == mapping.pause:
             return OperatorRequest(Request.RESUME if paused else Request.PAUSE)
-        if name in (mapping.reset, mapping.save):
-            return OperatorRequest(Request.RESET if name == mapping.reset else Request.SAVE)
+        asks = {
+            mapping.reset: Request.RESET,
+            mapping.save: Request.SAVE,
+            mapping.prove: Request.PROVE,
+            mapping.undo: Request.UNDO,
+        }
+        if name in asks:
+            return OperatorRequest(asks[name])
         index = mapping.experts.index(name)
         return OperatorRequest(Request.HANDOVER, experts[index] if index < len(experts) else f"expert {index + 1}")

@@ -7,7 +7,7 @@ from typing import TypeVar
 
 from lira.hal.bus.bus import Bus
 from lira.hal.bus.reader import Received
-from lira.hal.bus.topics import APPLIED, BATTERY, CAMERA, DECISION, ODOM, OPERATOR_ANSWER, SCAN, SIM_STATE
+from lira.hal.bus.topics import APPLIED, BATTERY, CAMERA, DECISION, ODOM, OPERATOR_ANSWER, SCAN, SESSION, SIM_STATE
 from lira.hal.messages import Reason
 from lira.hal.profile import RobotProfile
 from lira.tools.operator.view import View
@@ -23,6 +23,7 @@ class Ears:
         self._odom, self._applied = watch.reader(ODOM), watch.reader(APPLIED)
         self._decision, self._battery = watch.reader(DECISION), watch.reader(BATTERY)
         self._answer, self._truth = watch.reader(OPERATOR_ANSWER), watch.reader(SIM_STATE)
+        self._session = watch.reader(SESSION)
         self._answered, self._verdict_s = 0, -math.inf
         features, base = profile.features, profile.base
         self._view = View(
@@ -36,7 +37,7 @@ class Ears:
         """The view now."""
         scan, odom, applied = self._scan.newest(), self._odom.newest(), self._applied.newest()
         decision, battery, answer = self._decision.newest(), self._battery.newest(), self._answer.newest()
-        truth, picture = self._truth.newest(), self._camera.newest()
+        truth, picture, session = self._truth.newest(), self._camera.newest(), self._session.newest()
         if answer is not None and answer.message.count != self._answered:
             self._answered, self._verdict_s = answer.message.count, answer.arrived_s
         now_s = time.monotonic()
@@ -53,6 +54,8 @@ class Ears:
             link_age_s=_age_s(applied, now_s),
             decision=_message(decision),
             decision_age_s=_age_s(decision, now_s),
+            session=_message(session),
+            session_age_s=_age_s(session, now_s),
             battery=_message(battery),
             answer=_message(answer),
             answer_age_s=_age_s(answer, now_s),

@@ -8,6 +8,8 @@ The first of these rules that holds decides: who must act comes before who drive
 | nothing is heard of the robot | no_link |
 | the dead-man is held | person; slowly: person_slow; paused: person_paused |
 | a request paused it | paused |
+| a session is at a stage that is the person's | practice, ready, judging, verdict |
+| a session proves on a twin | proving |
 | a twin's lap is over | collided, strayed, finished |
 | the governor lets nothing through | its reason |
 | the policy stands and waits for a person | waits, unknown |
@@ -17,7 +19,7 @@ The first of these rules that holds decides: who must act comes before who drive
 
 from enum import StrEnum
 
-from lira.hal.messages import Applied, Call, Decision, Driver, Phase, Reason, Source
+from lira.hal.messages import Applied, Call, Decision, Driver, Phase, Reason, Source, Stage
 from lira.tools.operator.view import View
 
 HAND_DRIVES = "driving"
@@ -34,6 +36,10 @@ class Situation(StrEnum):
     PERSON_SLOW = "person_slow"
     PERSON_PAUSED = "person_paused"
     PAUSED = "paused"
+    PRACTICE = "practice"
+    READY = "ready"
+    JUDGING = "judging"
+    VERDICT = "verdict"
     COLLIDED = "collided"
     STRAYED = "strayed"
     FINISHED = "finished"
@@ -75,9 +81,9 @@ URGENCY: dict[Situation, Urgency] = {
     **dict.fromkeys((_S.ESTOP, _S.ESTOP_CONFIRMED, _S.NO_LINK), Urgency.ALARM),
     **dict.fromkeys((_S.STALE, _S.NEUTRAL_FIRST, _S.NEUTRAL_HELD, _S.REFUSED, _S.DEVICE_LOST), Urgency.NEED),
     **dict.fromkeys((_S.COLLIDED, _S.STRAYED, _S.WAITS, _S.OBSTACLE, _S.UNKNOWN, _S.SHIELD_STANDS), Urgency.NEED),
-    **dict.fromkeys((_S.DISAGREE,), Urgency.ASK),
-    **dict.fromkeys((_S.ONE_EXPERT, _S.SHIELD), Urgency.WATCH),
-    **dict.fromkeys((_S.PAUSED, _S.FINISHED, _S.NO_COMMAND, _S.TOLD_TO_STAND), Urgency.IDLE),
+    **dict.fromkeys((_S.DISAGREE, _S.VERDICT, _S.READY), Urgency.ASK),
+    **dict.fromkeys((_S.ONE_EXPERT, _S.SHIELD, _S.JUDGING), Urgency.WATCH),
+    **dict.fromkeys((_S.PAUSED, _S.FINISHED, _S.NO_COMMAND, _S.TOLD_TO_STAND, _S.PRACTICE), Urgency.IDLE),
 }
 
 STANDING: dict[Reason, Situation] = {
@@ -91,6 +97,16 @@ STANDING: dict[Reason, Situation] = {
 }
 
 
+# A session at one of these says by itself what is to be done, and puts a twin's robot back after a lap.
+STAGES: dict[Stage, Situation] = {
+    Stage.PRACTICE: _S.PRACTICE,
+    Stage.READY: _S.READY,
+    Stage.JUDGING: _S.JUDGING,
+    Stage.PROVING: _S.PROVING,
+    Stage.VERDICT: _S.VERDICT,
+}
+
+
 def situation_of(view: View) -> Situation:
     """Which situation this is, by the table above."""
     if view.estop:
@@ -99,11 +115,22 @@ def situation_of(view: View) -> Situation:
     if applied is None or not view.linked:
         return _S.NO_LINK
     if applied.source is Source.TELEOP:
-        return _S.PERSON_PAUSED if view.paused else _S.PERSON_SLOW if _is_slow(view) else _S.PERSON
+        return _by_hand(view)
     if view.paused:
         return _S.PAUSED
     standing = standing_of(applied, view.hand, decides=view.decision is not None)
-    return _lap_over(view) or standing or _driving(view.deciding)
+    stage = None if view.teaching is None else STAGES.get(view.teaching.stage)
+    if stage is not None:
+        return standing or stage if stage is _S.JUDGING else stage
+    over = _lap_over(view) if view.teaching is None else None  # a session begins the next lap by itself
+    return over or standing or _driving(view.deciding)
+
+
+def _by_hand(view: View) -> Situation:
+    """What the hand on the controls does to what is learned."""
+    if view.teaching is not None and view.teaching.stage is Stage.PRACTICE:
+        return _S.PRACTICE
+    return _S.PERSON_PAUSED if view.paused else _S.PERSON_SLOW if _is_slow(view) else _S.PERSON
 
 
 def lost_devices(applied: Applied) -> tuple[str, ...]:

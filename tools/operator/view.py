@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass, field
 
-from lira.hal.bus.topics import OPERATOR_ANSWER
+from lira.hal.bus.topics import OPERATOR_ANSWER, SESSION
 from lira.hal.messages import (
     Applied,
     BatteryState,
@@ -13,6 +13,7 @@ from lira.hal.messages import (
     Odometry,
     OperatorAnswer,
     Request,
+    SessionState,
 )
 
 STALE_S = 1.0
@@ -23,7 +24,7 @@ EMPTY_V, LOW_V, FULL_V = 10.2, 10.8, 12.6  # three lithium cells
 class View:
     """What is known now. A part is None until it was heard; ages are in seconds since it was.
 
-    `truth` is a twin's. `hand` is how the dead-man of
+    `truth` is a twin's, `session` that of who teaches. `hand` is how the dead-man of
     who looks is (`deadman.State`), None without one.
     `answer` is whoever's who drives and learns, repeated by them, and `verdict_age_s` how long ago it was a new one;
     `unanswered` is a request of who looks that nobody answered.
@@ -42,6 +43,8 @@ class View:
     link_age_s: float = float("inf")
     decision: Decision | None = None
     decision_age_s: float = float("inf")
+    session: SessionState | None = None
+    session_age_s: float = float("inf")
     battery: BatteryState | None = None
     answer: OperatorAnswer | None = None
     answer_age_s: float = float("inf")
@@ -73,6 +76,11 @@ class View:
     def answering(self) -> OperatorAnswer | None:
         """The newest answer if somebody still takes requests."""
         return self.answer if self.answer_age_s <= OPERATOR_ANSWER.max_age_s else None
+
+    @property
+    def teaching(self) -> SessionState | None:
+        """The session of teaching that goes on now; None where nobody holds one."""
+        return self.session if self.session_age_s < SESSION.max_age_s else None
 
     @property
     def paused(self) -> bool:

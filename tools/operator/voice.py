@@ -8,7 +8,7 @@ from pathlib import Path
 import msgspec
 
 from lira.hal.errors import ConfigError
-from lira.hal.messages import Applied, Source
+from lira.hal.messages import Applied, SessionState, Source
 from lira.tools.operator.situation import URGENCY, Situation, Urgency, lost_devices, situation_of, standing_of
 from lira.tools.operator.view import View
 
@@ -64,6 +64,20 @@ def verdict(view: View) -> tuple[str, bool | None]:
     return view.answering.words, view.answering.accepted
 
 
+def progress_words(session: SessionState) -> str:
+    """How a session of teaching goes, in a line."""
+    parts = [
+        f"{session.person}: lap {session.laps}, {session.passed} passed",
+        f"hit {session.collisions}, lost {session.lost}",
+        f"{session.alone:.0%} without you",
+        f"calls answered: {session.answered} of {session.calls}",
+        f"{session.labels} labels of yours",
+    ]
+    if session.shown:
+        parts.append(f"alone: {session.proven} of {session.shown}")
+    return "; ".join(parts)
+
+
 def _facts(view: View) -> dict[str, str]:
     """What the words may name."""
     decision = view.deciding
@@ -71,6 +85,7 @@ def _facts(view: View) -> dict[str, str]:
     return {
         "expert": "" if decision is None else decision.driver.upper(),
         "age": f" for {view.link_age_s:.0f} s" if heard else "",
+        "verdict": "" if view.teaching is None else view.teaching.words,
         "lost": "" if view.applied is None else ", ".join(lost_devices(view.applied)),
     }
 

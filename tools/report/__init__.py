@@ -6,6 +6,7 @@ from lira.hal.config import write_whole
 
 RECORD = "run.jsonl"
 PAGE = "report.html"
+COMPARISON = "comparison.html"
 
 
 def write_report(folder: Path) -> Path:
@@ -18,4 +19,15 @@ def write_report(folder: Path) -> Path:
 
     page = folder / PAGE
     write_whole(page, render(load_run(folder / RECORD)).encode())
+    return page
+
+
+def write_comparison(folders: tuple[Path, Path], page: Path) -> Path:
+    """Make one page on two runs and return its path. Raises `StorageError` as `write_report` does."""
+    from lira.tools.report.digest import load_run
+    from lira.tools.report.pair import render_pair
+
+    first, second = (load_run(folder / RECORD) for folder in folders)
+    names = (folders[0].resolve().name, folders[1].resolve().name)
+    write_whole(page, render_pair((first, second), names).encode())
     return page

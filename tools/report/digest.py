@@ -4,7 +4,15 @@ from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from lira.fusion.log.run_log import LapRecord, Record, ResultRecord, RunRecord, StepRecord, read_run
+from lira.fusion.log.run_log import (
+    LapRecord,
+    Record,
+    ResultRecord,
+    RunRecord,
+    StepRecord,
+    VerdictRecord,
+    read_run,
+)
 from lira.hal.errors import StorageError
 from lira.hal.messages import Action, Driver, Phase
 
@@ -46,6 +54,7 @@ class Run:
     laps: tuple[Lap, ...]
     result: ResultRecord | None
     experts: tuple[str, ...]
+    verdict: VerdictRecord | None = None  # the newest of a person's session
 
     def phase(self, name: str) -> list[Lap]:
         """Laps of one phase."""
@@ -70,6 +79,7 @@ class _Sorter:
 
     head: RunRecord | None = None
     result: ResultRecord | None = None
+    verdict: VerdictRecord | None = None
     laps: list[Lap] = field(default_factory=list)
     steps: list[StepRecord] = field(default_factory=list)
 
@@ -77,7 +87,7 @@ class _Sorter:
         match record:
             case RunRecord():
                 # A file that was appended to holds several runs: the last one counts.
-                self.head, self.result, self.laps, self.steps = record, None, [], []
+                self.head, self.result, self.verdict, self.laps, self.steps = record, None, None, [], []
             case StepRecord():
                 if self.steps and _key(self.steps[-1]) != _key(record):
                     self.end_lap(None)
@@ -86,6 +96,8 @@ class _Sorter:
                 self.end_lap(record)
             case ResultRecord():
                 self.result = record
+            case VerdictRecord():
+                self.verdict = record
 
     def end_lap(self, record: LapRecord | None) -> None:
         if record is not None:
@@ -112,7 +124,7 @@ def digest(records: Iterable[Record]) -> Run:
     for lap in sorter.laps:
         for step in lap.steps[:1]:
             experts |= dict.fromkeys(view.name for view in step.decision.experts)
-    return Run(sorter.head, tuple(sorter.laps), sorter.result, tuple(experts))
+    return Run(sorter.head, tuple(sorter.laps), sorter.result, tuple(experts), sorter.verdict)
 
 
 def load_run(path: Path) -> Run:

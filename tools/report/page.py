@@ -5,6 +5,7 @@ import math
 from collections.abc import Iterable, Sequence
 from html import escape
 from importlib import resources
+from statistics import median
 
 import cv2
 import numpy as np
@@ -12,6 +13,8 @@ import numpy as np
 from lira.hal.messages import Call, Driver, Phase
 from lira.tools.output.proven import contradiction_words, proof_words, unseen_words
 from lira.tools.report import plots
+from lira.tools.report.answers import COLUMNS as ANSWER_COLUMNS
+from lira.tools.report.answers import answer_cells, sum_up
 from lira.tools.report.course import course
 from lira.tools.report.digest import Lap, Run
 from lira.tools.report.laps import COLUMNS, clock, lap_cells
@@ -23,12 +26,17 @@ PICTURES = 24
 def render(run: Run) -> str:
     """Return the whole page."""
     title = f"{method_name(run)} on {run.head.world}" if run.head else "A run"
+    sections = [head(run, title), lap_table(run), answer_table(run), top_views(run), strips(run), densities(run)]
+    return styled(title, "".join([*sections, pictures(run)]))
+
+
+def styled(title: str, body: str) -> str:
+    """A page with its style inside."""
     style = (resources.files("lira.tools") / "report" / "page.css").read_text(encoding="utf-8")
-    sections = [head(run, title), lap_table(run), top_views(run), strips(run), densities(run), pictures(run)]
     return (
         '<!doctype html>\n<html lang="en"><head><meta charset="utf-8">'
         '<meta name="viewport" content="width=device-width, initial-scale=1">'
-        f"<title>{escape(title)}</title><style>{style}</style></head>\n<body>{''.join(sections)}</body></html>\n"
+        f"<title>{escape(title)}</title><style>{style}</style></head>\n<body>{body}</body></html>\n"
     )
 
 
@@ -67,6 +75,8 @@ def head(run: Run, title: str) -> str:
 
 def outcome(run: Run) -> tuple[str, str]:
     """One line for the end of the run, and its style."""
+    if run.verdict is not None:
+        return run.verdict.words, "good" if run.verdict.passed else "bad"
     if run.result is None:
         return "Cut off before its end", "bad"
     words = proof_words(run.result)
@@ -86,6 +96,15 @@ def figures(run: Run) -> Iterable[tuple[str, str]]:
         yield "simulated time", clock(result.simulated_s)
         if result.elapsed_s > 0:
             yield "times real time", f"{result.simulated_s / result.elapsed_s:.0f}"
+    if run.verdict is not None:
+        yield "taught by", run.verdict.person
+    human = sum_up(run)
+    if human.human_s:
+        yield "human drove", f"{human.human_s:.0f} s"
+    if human.calls:
+        yield "calls missed", f"{human.missed} of {human.calls}"
+    if human.reactions_s:
+        yield "reaction, median", f"{median(human.reactions_s):.2f} s"
     training = run.phase(Phase.TRAIN)
     alone = [lap.number for lap in training if lap.record and lap.record.unassisted]
     if training:
@@ -106,6 +125,21 @@ def lap_table(run: Run) -> str:
     )
     note = "Labels, interventions, calls, buffer and training steps are totals since the run began."
     return section("Laps", note, f'<div class="scroll"><table><tr>{header}</tr>{rows}</table></div>')
+
+
+def answer_table(run: Run) -> str:
+    """What each lap asked of the person; nothing where nobody ever drove."""
+    if not any(step.decision.driver == Driver.HUMAN for _, step in run.steps()):
+        return ""
+    header = "".join(f"<th>{escape(name)}</th>" for name in ANSWER_COLUMNS)
+    rows = "".join(
+        "<tr>" + "".join(f"<td>{escape(cell)}</td>" for cell in answer_cells(lap)) + "</tr>"
+        for lap in run.phase(Phase.TRAIN)
+    )
+    note = "Reaction: from the robot's question to the dead-man. Missed: nobody answered until 2 s after it had ended."
+    return section(
+        "What it asked of the person", note, f'<div class="scroll"><table><tr>{header}</tr>{rows}</table></div>'
+    )
 
 
 def top_views(run: Run) -> str:

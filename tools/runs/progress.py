@@ -8,7 +8,7 @@ from typing import TextIO
 
 import msgspec
 
-from lira.fusion.log.run_log import LapRecord, Record, ResultRecord, RunRecord, StepRecord
+from lira.fusion.log.run_log import LapRecord, Record, ResultRecord, RunRecord, StepRecord, VerdictRecord
 from lira.hal.config import MALFORMED
 from lira.hal.errors import StorageError
 from lira.hal.messages import Call, Decision, Phase
@@ -70,6 +70,8 @@ class Progress:
             case ResultRecord():
                 self.result = record
                 return result_line(record)
+            case VerdictRecord():
+                return f"verdict: {record.words}"
 
     def status(self) -> str:
         """Where the run is now, in one line; empty before the first step."""

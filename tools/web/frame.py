@@ -6,7 +6,7 @@ import msgspec
 
 from lira.hal.messages import Action, Driver, LaserScan
 from lira.tools.operator.view import STALE_S, View, battery_share
-from lira.tools.operator.voice import speak, verdict
+from lira.tools.operator.voice import progress_words, speak, verdict
 
 BEAMS = 180  # as many as a fan on a small screen can show
 
@@ -31,6 +31,15 @@ class Counts(msgspec.Struct, frozen=True):
     training_steps: int
     lap: int
     phase: str
+
+
+class Session(msgspec.Struct, frozen=True):
+    """How a session of teaching goes."""
+
+    stage: str
+    layout: int
+    words: str
+    curve: tuple[float, ...] = ()
 
 
 class Frame(msgspec.Struct, frozen=True):
@@ -60,6 +69,7 @@ class Frame(msgspec.Struct, frozen=True):
     driver: str = ""
     actors: tuple[Actor, ...] = ()
     counts: Counts | None = None
+    session: Session | None = None
     scan: tuple[tuple[float, float], ...] | None = None
     pose: tuple[float, float, float] | None = None
 
@@ -97,6 +107,9 @@ def frame_of(view: View, *, time_s: float, seat: str, language: str) -> Frame:
         driver="" if decision is None else decision.driver,
         actors=tuple(actors),
         counts=counts_of(view),
+        session=None
+        if view.teaching is None
+        else Session(view.teaching.stage, view.teaching.layout, progress_words(view.teaching), view.teaching.curve),
         scan=None if view.scan is None or view.scan_age_s > STALE_S else points_of(view.scan, view),
         pose=pose_of(view),
     )

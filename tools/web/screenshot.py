@@ -35,7 +35,7 @@ def save_page(path: Path, size: tuple[int, int] = SIZE) -> None:
     picture = view.picture
     assert picture is not None
     info = Info(load_profile("thesis-sim"), "realtime", 0, arena=msgspec.Raw(msgspec.json.encode(world)))
-    settings = lambda language: settings_of(info, view.robot, 0, language)  # noqa: E731
+    settings = lambda language, layout: settings_of(info, view.robot, 0, language, layout)  # noqa: E731
     access = Access(open_here=True, hosts=own_names(HOST))
     server = PageServer(lambda: replace(view, picture=replace(picture)), Seat(), access, None, settings)
     stop, up, ports = threading.Event(), threading.Event(), list[int]()

@@ -36,6 +36,8 @@ class Control(StrEnum):
     PAUSE = "pause"
     RESET = "reset"
     SAVE = "save"
+    PROVE = "prove"
+    UNDO = "undo"
     EXPERT_1 = "expert_1"
     EXPERT_2 = "expert_2"
     EXPERT_3 = "expert_3"
@@ -73,6 +75,8 @@ def pad_of(said: Input, mapping: Mapping) -> PadState:
         Control.PAUSE: mapping.pause,
         Control.RESET: mapping.reset,
         Control.SAVE: mapping.save,
+        Control.PROVE: mapping.prove,
+        Control.UNDO: mapping.undo,
         **experts,
     }
     sticks = ((mapping.forward, said.forward), (mapping.turn, said.turn))

@@ -30,6 +30,7 @@ STATIC = Path(__file__).parent / "static"
 FRAMES_HZ = 30.0  # a page that drives answers each of them: they are its heartbeat
 MOST_CLIENTS = 16
 LONGEST_BYTES = 2048
+LONGEST_LAYOUT = 9  # digits
 MOST_SAID_HZ = 200.0
 LOOK_S = 0.1
 SEND_S = 5.0  # a browser that takes nothing for so long is gone
@@ -119,7 +120,7 @@ class PageServer:
         seat: Seat,
         access: Access,
         hand: Hand | None,
-        settings: Callable[[str], dict[str, Any]],
+        settings: Callable[[str, int | None], dict[str, Any]],
         say: Callable[[str], None] = print,
     ) -> None:
         self._look, self._seat, self._access, self._hand = look, seat, access, hand
@@ -167,7 +168,11 @@ class PageServer:
 
     async def _tell_settings(self, request: web.Request) -> web.StreamResponse:
         language = request.query.get("language", ENGLISH)
-        return web.json_response(self._settings(language if language in languages() else ENGLISH))
+        layout = request.query.get("layout", "")
+        known = layout.isdecimal() and len(layout) <= LONGEST_LAYOUT
+        return web.json_response(
+            self._settings(language if language in languages() else ENGLISH, int(layout) if known else None)
+        )
 
     async def _talk(self, request: web.Request) -> web.StreamResponse:
         """One browser, until it goes."""

@@ -14,7 +14,7 @@ from lira.tools.web.floor import floor_of
 WORDS = Path(__file__).parent / "words"
 
 
-def settings_of(info: Info, robot: str, layout: int, language: str) -> dict[str, Any]:
+def settings_of(info: Info, robot: str, usual: int, language: str, layout: int | None = None) -> dict[str, Any]:
     """Everything in one table. Times of what shakes are in milliseconds, on and off in turn, as browsers have it."""
     base, features = info.profile.base, info.profile.features
     return {
@@ -26,7 +26,7 @@ def settings_of(info: Info, robot: str, layout: int, language: str) -> dict[str,
         "limits": [base.max_linear_m_s, base.max_angular_rad_s],
         "fov_rad": features.fov_rad,
         "max_range_m": features.max_range_m,
-        "floor": floor_of(info, layout),
+        "floor": floor_of(info, usual if layout is None else layout),
     }
 
 

@@ -3,13 +3,13 @@
 
 const SAY_MS = 40; // three that do not come, and the hand is gone
 const KEYS = {
-  " ": "dead_man", Shift: "turbo", F1: "release", p: "pause", s: "save", r: "reset",
+  " ": "dead_man", Shift: "turbo", F1: "release", p: "pause", s: "save", r: "reset", v: "prove", u: "undo",
   1: "expert_1", 2: "expert_2", 3: "expert_3", 4: "expert_4",
 };
 const ARROWS = { ArrowUp: [1, 0], ArrowDown: [-1, 0], ArrowLeft: [0, 1], ArrowRight: [0, -1] };
 // The standard mapping of the Gamepad API, with the controls where `lira joystick` has them.
 const PAD = {
-  4: "dead_man", 5: "turbo", 8: "estop", 16: "estop", 9: "release", 2: "pause", 3: "save", 1: "reset",
+  4: "dead_man", 5: "turbo", 8: "estop", 16: "estop", 9: "release", 2: "pause", 3: "save", 1: "reset", 0: "prove", 10: "undo",
   12: "expert_1", 15: "expert_2", 13: "expert_3", 14: "expert_4",
 };
 

@@ -38,6 +38,7 @@ function show(frame) {
   document.body.dataset.seat = frame.seat;
   tell(frame.urgency, frame.who, frame.why, frame.now);
   at("#pause").textContent = frame.paused ? words.resume : words.pause;
+  showSession(frame.session, words);
   at("#drive").textContent = { yours: words.leave, free: words.drive, taken: words.taken, viewer: words.viewer }[frame.seat];
   at("#drive").disabled = frame.seat === "taken" || frame.seat === "viewer";
   at("#verdict").textContent = frame.verdict;
@@ -56,6 +57,24 @@ function show(frame) {
   showCounts(at("#taught dl"), frame.counts, words);
   if (frame.counts !== null) curve.add(frame).draw(at("#taught canvas"));
   offerExperts(frame.actors.filter((actor) => actor.activation !== null).map((actor) => actor.name));
+}
+
+// A session of teaching: how it goes, and what its one button asks at this stage.
+function showSession(session, words) {
+  at("#prove").hidden = at("#undo").hidden = session === null;
+  if (session !== null) {
+    at("#prove").textContent = { judging: words.passed, verdict: words.finish }[session.stage] || words.prove;
+    at("#reset").textContent = session.stage === "judging" ? words.failed : words.reset;
+    at("#session").textContent = session.words;
+    if (session.layout !== layout) fetchFloor(session.layout);
+  } else at("#session").textContent = "";
+}
+
+let layout = null; // of the twin, whose boxes are drawn
+async function fetchFloor(wanted) {
+  layout = wanted;
+  const answer = await fetch(`/settings.json?language=${settings.language}&layout=${wanted}`);
+  if (answer.ok) settings.floor = (await answer.json()).floor;
 }
 
 function tell(urgency, who, why, now) {

@@ -1,0 +1,293 @@
+"""A person's session: what its buttons ask at each stage, how laps end, what is told, and all of it on a twin."""
+
+import dataclasses
+
+import pytest
+from msgspec import structs
+
+from lira.fusion.control import ControlLoop
+from lira.fusion.experts.tasks import TASKS
+from lira.fusion.learning.trainer import InlineTrainer
+from lira.fusion.log.counts import Ledger
+from lira.fusion.log.label_log import read_demonstrations
+from lira.fusion.log.recorder import Journal
+from lira.fusion.log.run_log import LapRecord, RunWriter
+from lira.fusion.methods.presets import METHODS
+from lira.fusion.teaching.session import Tally
+from lira.fusion.teaching.teacher import SKILLED
+from lira.hal.errors import ConfigError
+from lira.hal.messages import Applied, CourseState, LabelCounts, OperatorRequest, Phase, Request, Source, Stage
+from lira.hal.profile import load_profile
+from lira.sim_backend.catalogue import load_world
+from lira.tools.live.board import Board
+from lira.tools.live.classroom import Classroom
+from lira.tools.live.lap import Fate, fate
+from lira.tools.live.requests import reply
+from lira.tools.live.session import LiveSession, Rules
+from lira.tools.live.verdict import has_passed, judged_words, verdict_words
+from lira.tools.runs.build import teacher
+from lira.tools.runs.course import Course
+from lira.tools.runs.simulated import simulate
+from lira.tools.runs.teach import Plan
+
+PASSED = LapRecord(Phase.PROVE, 1, 0, True, True, 80.0, 0, 0, 0.1, 10, 2, 3, 20, 5, 1.0)
+TRUTH = CourseState(1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 3.0, 0.1, 1.0)
+
+
+def lap(phase, *, passed=True, **words):
+    return structs.replace(PASSED, phase=phase, passed=passed, **words)
+
+
+# What the buttons ask
+
+
+REPLIES = [
+    (Request.FINISH, Stage.TEACHING, Request.FINISH),
+    (Request.PROVE, Stage.TEACHING, Request.PROVE),
+    (Request.PROVE, Stage.DEMONSTRATION, Request.PROVE),
+    (Request.PROVE, Stage.JUDGING, Request.PASSED),
+    (Request.PROVE, Stage.VERDICT, Request.FINISH),
+    (Request.PASSED, Stage.JUDGING, Request.PASSED),
+    (Request.FAILED, Stage.JUDGING, Request.FAILED),
+    (Request.RESET, Stage.JUDGING, Request.FAILED),
+    (Request.RESET, Stage.TEACHING, Request.RESET),
+    (Request.RESUME, Stage.PRACTICE, Request.RESUME),
+    (Request.PAUSE, Stage.VERDICT, Request.RESUME),
+]
+REFUSED = [
+    (Request.PROVE, Stage.PRACTICE),
+    (Request.PROVE, Stage.PROVING),
+    (Request.PASSED, Stage.TEACHING),
+    (Request.FAILED, Stage.VERDICT),
+    (Request.UNDO, Stage.PROVING),
+]
+
+
+@pytest.mark.parametrize(("request_", "stage", "ends"), REPLIES)
+def test_a_button_asks_what_the_stage_makes_of_it(request_, stage, ends):
+    replied = reply(request_, stage, trained=True)
+    assert (replied.answer[0], replied.ends) == (True, ends)
+
+
+@pytest.mark.parametrize(("request_", "stage"), REFUSED)
+def test_what_makes_no_sense_at_a_stage_is_refused_and_ends_nothing(request_, stage):
+    replied = reply(request_, stage, trained=True)
+    assert (replied.answer[0], replied.ends) == (False, None)
+
+
+def test_nothing_is_proven_of_who_has_learned_nothing():
+    assert reply(Request.PROVE, Stage.TEACHING, trained=False).ends is None
+
+
+@pytest.mark.parametrize("request_", [Request.PAUSE, Request.SAVE, Request.HANDOVER])
+def test_pause_save_and_handover_stay_those_of_the_service(request_):
+    assert reply(request_, Stage.TEACHING, trained=True) is None
+
+
+# How a lap ends
+
+
+def on(**words):
+    return dataclasses.replace(TRUTH, **words)
+
+
+FATES = [
+    (on(), Phase.TRAIN, {}, Fate.GOES_ON),
+    (on(collided=True), Phase.TRAIN, {}, Fate.PUT_BACK),
+    (on(lost=True), Phase.TRAIN, {}, Fate.PUT_BACK),
+    (on(collided=True), Phase.PROVE, {}, Fate.OVER),
+    (on(lost=True), Phase.UNSEEN, {}, Fate.OVER),
+    (on(finished=True), Phase.TRAIN, {}, Fate.OVER),
+    (on(), Phase.TRAIN, {"late": True}, Fate.GOES_ON),  # a person takes the time it takes
+    (on(), Phase.PROVE, {"late": True}, Fate.OVER),
+    (on(clearance_m=0.1), Phase.TRAIN, {"blind": True}, Fate.PUT_BACK),
+    (on(clearance_m=2.0), Phase.TRAIN, {"blind": True}, Fate.GOES_ON),
+]
+
+
+@pytest.mark.parametrize(("state", "phase", "words", "expected"), FATES)
+def test_a_lap_goes_on_is_put_back_or_is_over(state, phase, words, expected):
+    tally = Tally()
+    assert fate(state, tally, phase, **{"blind": False, "late": False, **words}) is expected
+    assert tally.passed == (expected is Fate.GOES_ON or state.finished)
+
+
+# What it comes to
+
+
+def test_a_verdict_says_how_many_unseen_layouts_and_how_sure_that_is():
+    laps = [lap(Phase.PROVE), *[lap(Phase.UNSEEN)] * 11, lap(Phase.UNSEEN, passed=False, collisions=1)]
+    assert verdict_words(laps) == "It drove 11 of 12 unseen layouts; 95 %: 62 to 100 % (collisions: 1)"
+    assert has_passed(laps)
+    assert not has_passed([*laps, lap(Phase.UNSEEN, passed=False)])
+
+
+def test_who_fails_where_it_was_taught_has_not_passed_and_the_verdict_says_why():
+    assert not has_passed([])
+    own = [lap(Phase.PROVE, passed=False, lost=1)]
+    assert verdict_words(own) == "It did not drive the course it was taught on alone (lost: 1)"
+    helped = [lap(Phase.PROVE, passed=False, unassisted=False)]
+    assert verdict_words(helped).endswith("(you took over: 1)")
+    assert "were not tried" in verdict_words([lap(Phase.PROVE)])
+    assert judged_words(2, 3).startswith("It drove 2 of 3 times as you wanted; 95 %")
+
+
+def test_the_board_counts_laps_and_tells_a_new_stage_at_once():
+    told, said = [], []
+    board = Board("ada", Ledger(), lambda: 1.0, told.append, said.append)
+    assert board.begin_lap() == 1
+    board.show(Stage.TEACHING, 3)
+    board.show(Stage.TEACHING, 3)  # too soon to be told again
+    board.end_lap(Tally(steps=10, human_steps=4), lap(Phase.TRAIN, collisions=2))
+    board.note_proof([lap(Phase.PROVE), lap(Phase.UNSEEN, passed=False)], "words")
+    board.show(Stage.VERDICT, 4)
+    assert [(state.stage, state.layout) for state in told] == [(Stage.TEACHING, 3), (Stage.VERDICT, 4)]
+    last = told[-1]
+    assert (last.person, last.laps, last.passed, last.collisions, last.words) == ("ada", 1, 1, 2, "words")
+    assert (last.curve, last.proven, last.shown) == ((pytest.approx(0.6),), 1, 2)
+    assert "60% driven without you" in said[0]
+
+
+def test_counts_go_on_from_another_day_and_labels_are_taken_back():
+    ledger = Ledger()
+    before = LabelCounts(given_human=5, given_expert=9, stored_human=4, stored_expert=7, demonstration=3)
+    ledger.go_on(before, interventions=2, calls=6)
+    assert (ledger.labels, ledger.interventions, ledger.calls) == (before, 2, 6)
+    ledger.take_back("human", 5)
+    assert (ledger.labels.stored_human, ledger.labels.demonstration) == (0, 2)
+
+
+# A whole session, in this process
+
+
+class Taught(ControlLoop):
+    """A loop into which a scripted teacher reaches as a person's hand would."""
+
+    def __init__(self, robot, hand):
+        super().__init__(robot, truth=robot.arena.state)
+        self.hand = hand
+
+    def step(self, method, teacher=None):
+        return super().step(method, self.hand)
+
+
+class Always:
+    """A hand that is there whenever it is looked for."""
+
+    holds = True
+
+
+class NoService:
+    """Nobody asks anything, until `script` says so at a stage."""
+
+    paused = False
+
+    def __init__(self, session, script):
+        self.session, self.script, self.answers = session, dict(script), []
+
+    def serve(self):
+        request = self.script.pop(self.session.board.stage, None)
+        if request is not None:
+            self.answers.append(self.session.take(OperatorRequest(request)))
+
+    def change_method(self, method):
+        self.session_method = method
+
+
+def hold(folder, *, script, laps=3, world="line", unseen=1, practice_s=0.0):
+    """A session on a twin in this process."""
+    place, profile = load_world(world), load_profile(TASKS["line"].profile)
+    limits, line = structs.replace(place.limits, finish_m=12.0), structs.replace(place.line, closed=False)
+    place = structs.replace(place, limits=limits, line=line)  # a short lap
+    plan = Plan(METHODS["plus"], folder=folder, laps=laps)
+    said, told, written = [], [], []
+    with simulate(place, profile, renderer="sketch") as robot:
+        hand = teacher(SKILLED, profile, place, 0, 0)
+        with (
+            Classroom(plan, profile, world, InlineTrainer, said.append) as room,
+            RunWriter(folder / "run.jsonl") as file,
+        ):
+            file.write(room.head)
+            journal = Journal(keep=room.keep, write=lambda record: (written.append(record), file.write(record)))
+            room.go_on(journal.ledger)
+            course = Course(profile, place, unseen=range(1, 1 + unseen))
+            session = LiveSession(
+                robot,
+                robot.arena,
+                course,
+                Taught(robot, hand),
+                room,
+                journal,
+                Always(),
+                Rules(practice_s, "ada", laps),
+                said.append,
+                told.append,
+                lambda applied: str(applied.reason),
+            )
+            session.service = NoService(session, script)
+            session.run()
+        hand.close()
+    return session, said, told, written
+
+
+@pytest.fixture(scope="module")
+def held(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("session")
+    script = {Stage.VERDICT: Request.FINISH}
+    return folder, *hold(folder, script=script, laps=1, unseen=0, practice_s=1.0)
+
+
+def test_a_session_goes_from_practice_to_a_verdict(held):
+    _, session, said, told, written = held
+    stages = list(dict.fromkeys(state.stage for state in told))
+    assert stages[:2] == [Stage.PRACTICE, Stage.READY]
+    assert stages[-1] is Stage.OVER
+    laps = [record for record in written if isinstance(record, LapRecord)]
+    assert laps[0].phase is Phase.TRAIN
+    assert said[0].startswith("practice")
+    assert session.board.state.laps == len([each for each in laps if each.phase == Phase.TRAIN])
+    assert all(record.state is not None for record in written if hasattr(record, "decision"))  # the truth is in it
+
+
+def test_it_goes_on_another_day_with_counts_that_go_on(held):
+    folder, session, *_ = held
+    plan = Plan(METHODS["plus"], folder=folder)
+    with Classroom(plan, load_profile("thesis-sim"), "line", InlineTrainer, print) as room:
+        ledger = Ledger()
+        room.go_on(ledger)
+        before = session.result()
+        assert ledger.labels.stored_human == before.human_labels
+        assert ledger.interventions == before.interventions
+        assert room.method.novice.stored == sum(label.stored for label in read_demonstrations(folder / "labels.lira"))
+
+
+def test_another_method_does_not_go_on_in_its_folder(held):
+    plan = Plan(METHODS["hold"], folder=held[0])
+    with pytest.raises(ConfigError, match="was taught by 'plus'"):
+        Classroom(plan, load_profile("thesis-sim"), "line", InlineTrainer, print)
+
+
+def test_the_last_interventions_labels_are_taken_back_and_unlearned(held):
+    folder, *_ = held
+    plan = Plan(METHODS["plus"], folder=folder)
+    first = next(read_demonstrations(folder / "labels.lira"))
+    with Classroom(plan, load_profile("thesis-sim"), "line", InlineTrainer, print) as room:
+        for number in range(3):
+            stamp_s = 1000.0 + 0.2 * number
+            room.keep(
+                dataclasses.replace(first, source="human", stored=True, stamp_s=stamp_s, observation=9000 + number)
+            )
+    with Classroom(plan, load_profile("thesis-sim"), "line", InlineTrainer, print) as room:
+        ledger, stored = Ledger(), room.method.novice.stored
+        ledger.go_on(LabelCounts(stored_human=5), 0, 0)
+        assert room.undo(ledger) == (True, "the 3 labels of the last intervention are not learned any more")
+        assert room.method.novice.stored == stored - 3
+        assert ledger.labels.stored_human == 2
+
+
+def test_applied_by_a_hand_is_a_hand():
+    from lira.tools.live.hand import is_by_hand
+
+    assert is_by_hand(Applied(None, 0.0, Source.TELEOP), 0.1)
+    assert not is_by_hand(Applied(None, 0.0, Source.TELEOP), 1.0)
+    assert not is_by_hand(Applied(None, 0.0, Source.POLICY), 0.1)

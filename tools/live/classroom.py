@@ -1,0 +1,107 @@
+"""The learner of a session and its files: it goes on another day, and unlearns what a person takes back."""
+
+import contextlib
+from pathlib import Path
+from types import TracebackType
+from typing import Self
+
+from lira.fusion.experts.tasks import task_of
+from lira.fusion.learning.labels import Label
+from lira.fusion.log.counts import Ledger
+from lira.fusion.log.label_edit import correct, last_intervention, read_heads
+from lira.fusion.log.label_log import Demonstration, DemonstrationLog, read_demonstrations
+from lira.fusion.log.run_log import RunRecord, StepRecord, read_run
+from lira.fusion.methods.base import Method
+from lira.fusion.operator_service import Job
+from lira.hal.errors import ConfigError
+from lira.hal.messages import Decision, Driver
+from lira.hal.profile import RobotProfile
+from lira.tools.runs.build import NewTrainer, build_method
+from lira.tools.runs.folder import LABELS, RECORD, snapshot
+from lira.tools.runs.progress import Say
+from lira.tools.runs.teach import Plan
+
+
+class Classroom:
+    """Whoever is taught, by whom it is written down, and where. A context: in the end all is saved and closed.
+
+    Raises `StorageError` for a damaged or foreign log, `ConfigError` for another method than the folder's.
+    """
+
+    def __init__(self, plan: Plan, profile: RobotProfile, world: str, trainer: NewTrainer, say: Say) -> None:
+        assert plan.folder is not None
+        self.folder: Path = plan.folder
+        self._plan, self._profile, self._world = plan, profile, world
+        self._trainer, self._say = trainer, say
+        self.head: RunRecord = plan.head(profile, world)
+        self.before = newest_decision(self.folder / RECORD, self.head)
+        self._log = self._open_log()
+        try:
+            self.method: Method = self._learned()
+        except BaseException:
+            self._log.close()
+            raise
+
+    def keep(self, label: Demonstration) -> None:
+        """Write a label down."""
+        self._log.append(label)
+
+    def go_on(self, ledger: Ledger) -> None:
+        """Have a ledger count on from the day before."""
+        if self.before is not None:
+            ledger.go_on(self.before.labels, self.before.interventions, self.before.calls)
+
+    def undo(self, ledger: Ledger) -> tuple[bool, str]:
+        """Take the labels of the last intervention back; the learner begins anew without them."""
+        self._log.close()
+        try:
+            numbers = last_intervention(read_heads(self.folder / LABELS))
+            taken = correct(self.folder / LABELS, numbers, stored=False)
+        finally:
+            self._log = self._open_log()
+        if not taken:
+            return False, "there is no intervention to take back"
+        ledger.take_back(Driver.HUMAN, len(taken))
+        self.method.close()
+        self.method = self._learned()
+        return True, f"the {len(taken)} labels of the last intervention are not learned any more"
+
+    def snapshot(self) -> Job:
+        """Take what was learned as it is now; what is returned writes it."""
+        return snapshot(self.folder, self.method.novice, self._profile, self.head, self._log.sync)
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        with contextlib.closing(self._log):
+            self.method.close()
+
+    def _open_log(self) -> DemonstrationLog:
+        mirrored = self._plan.preset.mirrored
+        return DemonstrationLog(self.folder / LABELS, self._profile, mirrored=mirrored, say=self._say)
+
+    def _learned(self) -> Method:
+        """A new learner that has learned all that is in the log."""
+        plan = self._plan
+        pair = plan.pair or task_of(self._world)
+        method = build_method(plan.preset, self._profile, plan.seed, self._trainer, pair, plan.more, plan.build)
+        novice = method.novice
+        for old in read_demonstrations(self.folder / LABELS):
+            if old.stored:
+                novice.remember(Label(old.features, old.action, old.source, novice.weight(old.source)))
+        return method
+
+
+def newest_decision(path: Path, head: RunRecord) -> Decision | None:
+    """What a folder's record ends with: its counts go on. Raises `ConfigError` if it is of another method or robot."""
+    newest: Decision | None = None
+    for record in read_run(path) if path.is_file() else ():
+        if isinstance(record, StepRecord):
+            newest = record.decision
+        elif isinstance(record, RunRecord) and (record.preset, record.profile) != (head.preset, head.profile):
+            what = f"{path.parent} was taught by '{record.preset}' on a '{record.profile}'"
+            raise ConfigError(what, "Go on with these, or choose another --run.")
+    return newest

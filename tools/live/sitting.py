@@ -1,0 +1,84 @@
+"""One sitting of `lira teach` on a robot that is on the bus: from the first request to the report's last record."""
+
+import argparse
+import contextlib
+from dataclasses import dataclass
+
+import msgspec
+
+from lira.fusion.control import ControlLoop
+from lira.fusion.learning.trainer import ProcessTrainer
+from lira.fusion.log.recorder import Journal
+from lira.fusion.log.run_log import RunWriter, VerdictRecord
+from lira.fusion.operator_service import OperatorService
+from lira.hal.bus.bus import Bus
+from lira.hal.bus.topics import DECISION, SESSION
+from lira.hal.client.remote import RemoteRobot
+from lira.sim_backend.world import World
+from lira.tools.launch.lifetime import CLOSE_S, saving, stop_or_interrupt
+from lira.tools.live.classroom import Classroom
+from lira.tools.live.hand import Hand
+from lira.tools.live.session import LiveSession, Rules
+from lira.tools.operator.voice import explain
+from lira.tools.runs.course import Course
+from lira.tools.runs.folder import LABELS, RECORD, in_the_log
+from lira.tools.runs.progress import Say
+from lira.tools.runs.reach import FLOOR, request_line
+from lira.tools.runs.teach import Plan
+
+
+@dataclass(frozen=True, slots=True)
+class Outcome:
+    """What a sitting came to. `passed` is None if nothing was proven."""
+
+    passed: bool | None
+    words: str
+
+
+def sit(args: argparse.Namespace, plan: Plan, robot: RemoteRobot, rules: Rules, say: Say) -> Outcome:
+    """Teach until the person ends the session, or Ctrl-C does; what was learned is saved however it ends."""
+    world = msgspec.json.decode(robot.info.arena, type=World | None)
+    arena = robot.arena
+    course = None
+    if world is not None:
+        unseen = range(plan.layout + 1, plan.layout + 1 + plan.unseen)
+        course = Course(robot.profile, world, plan.layout, plan.preset.syllabus, plan.laps, unseen=unseen)
+    name = FLOOR if world is None else world.name
+    folder = plan.folder
+    assert folder is not None
+    with contextlib.ExitStack() as stack:
+        room = stack.enter_context(Classroom(plan, robot.profile, name, ProcessTrainer, say))
+        record = stack.enter_context(RunWriter(folder / RECORD))
+        record.write(room.head)
+        decisions, sessions = robot.bus.publisher(DECISION), robot.bus.publisher(SESSION)
+        journal = Journal(
+            keep=room.keep, write=record.write, publish=lambda decision: decisions.put(decision, robot.now())
+        )
+        room.go_on(journal.ledger)
+        watch = Bus(args.name, connect=args.connect, watch=True)
+        stack.callback(watch.close, CLOSE_S)
+        truth = None if arena is None else robot.link.state
+        session = LiveSession(
+            *(robot, arena, course, ControlLoop(robot, truth=truth), room, journal, Hand(watch), rules, say),
+            publish=lambda state: sessions.put(state, robot.now()),
+            explain=explain,
+        )
+        stack.enter_context(saving(room.snapshot, say))
+        session.stop = stack.enter_context(stop_or_interrupt())
+        line = stack.enter_context(request_line(robot, args))
+        session.service = stack.enter_context(
+            contextlib.closing(
+                OperatorService(
+                    line, session.loop, room.method, journal, say, snapshot=room.snapshot, session=session.take
+                )
+            )
+        )
+        session.loop.arm()
+        if room.before is not None:
+            say(f"goes on with {room.method.novice.stored} labels from before")
+        session.run()
+        aside = in_the_log(folder / LABELS, room.method.novice.set_aside())
+        record.write(msgspec.structs.replace(session.result(), contradictions=tuple(aside)))
+        passed = session.converged if session.words else None
+        record.write(VerdictRecord(rules.person, session.words or "Nothing was proven", bool(passed)))
+    return Outcome(passed, session.words)
