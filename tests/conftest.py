@@ -32,6 +32,7 @@ EXPECTED_SKIPS = {
     "over the bus in real time the answer is a step behind",
     "in lockstep silence stops time",
     "no package index answers",
+    "no client of others is installed",
 }
 OPEN = "lira/open"  # in pytest's cache: what failed in the crowd
 MOST_OPEN = 20

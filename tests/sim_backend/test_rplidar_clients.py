@@ -57,7 +57,7 @@ def line(request):
 @pytest.fixture(autouse=True)
 def no_modem_lines(monkeypatch):
     """A pseudo-terminal has none; some clients set one to start an A1's motor."""
-    serial = pytest.importorskip("serial")
+    serial = pytest.importorskip("serial", reason="no client of others is installed")
     monkeypatch.setattr(serial.Serial, "_update_dtr_state", lambda _: None)
 
 
@@ -78,7 +78,7 @@ def connected(sdk, path, model):
 
 
 def test_the_vendors_client_scans_and_finds_a_unit_that_a_killed_one_left_scanning(line):
-    sdk = pytest.importorskip("pyrplidarsdk")
+    sdk = pytest.importorskip("pyrplidarsdk", reason="no client of others is installed")
     model, path = line
     driver = connected(sdk, path, model)
     assert driver.get_device_info().model == model.number
@@ -97,7 +97,7 @@ def test_the_vendors_client_scans_and_finds_a_unit_that_a_killed_one_left_scanni
 
 
 def test_a_second_client_sees_whole_turns(line):
-    rplidar = pytest.importorskip("rplidar")
+    rplidar = pytest.importorskip("rplidar", reason="no client of others is installed")
     model, path = line
     lidar = rplidar.RPLidar(path, baudrate=model.baud)
     lidar.motor_speed = 600
@@ -117,7 +117,7 @@ def test_a_second_client_sees_whole_turns(line):
 
 
 def test_a_third_client_reads_the_table_of_modes_and_one_start_a_turn(line):
-    pyrplidar = pytest.importorskip("pyrplidar")
+    pyrplidar = pytest.importorskip("pyrplidar", reason="no client of others is installed")
     model, path = line
     lidar = pyrplidar.PyRPlidar()
     lidar.connect(port=path, baudrate=model.baud, timeout=3)

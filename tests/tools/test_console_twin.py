@@ -74,7 +74,7 @@ def test_a_person_teaches_with_the_keyboard_alone(tmp_path):
         learner = stack.enter_context(ChildProcess("the learner", fusion, tmp_path / "lira.fusion.log"))
         hand, watch = stack.enter_context(typist(name, endpoint))
         decisions, applied, answers = (watch.reader(topic) for topic in (DECISION, APPLIED, OPERATOR_ANSWER))
-        assert newest(decisions, lambda d: d.call == "feedback", READY_S).driver == "human"
+        assert newest(decisions, lambda d: d.call == "feedback", READY_S).driver == "none"  # it waits
         hand.hold("space")
         newest(applied, lambda a: a.source is Source.TELEOP)
         hand.hold("space", "up")

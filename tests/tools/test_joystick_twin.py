@@ -88,10 +88,10 @@ def learner(address, tmp_path, *words):
     return ChildProcess("the learner", [*command, *words], tmp_path / "lira.fusion.log")
 
 
-def test_a_press_takes_the_wheel_from_the_learner_which_labels_it(bed, hand, watch, address, tmp_path):
+def test_a_press_takes_control_from_the_learner_which_labels_it(bed, hand, watch, address, tmp_path):
     with learner(address, tmp_path, "--method", "lira", "--idle-frames", "skip") as process:
         decisions, applied = watch.reader(DECISION), watch.reader(APPLIED)
-        decision = newest(decisions, lambda d: d.driver == "human", READY_S)
+        decision = newest(decisions, lambda d: d.driver == "none", READY_S)
         assert [expert.name for expert in decision.experts] == ["camera", "lidar"]
         assert decision.labels.demonstration == 0
         bed.key(PAD, "BTN_TL", 1)

@@ -13,7 +13,7 @@ from lira.hal.bus.bus import Bus
 from lira.hal.bus.topics import APPLIED
 from lira.hal.client.remote import RemoteRobot
 from lira.hal.messages import STOP, Command, Source, Twist
-from lira.tools.bench import null_robot
+from lira.tools.bench.parts import null_robot
 from lira.tools.launch.processes import ChildProcess, free_port, lira_command
 
 NEEDED = ("chromium", "chromedriver")
