@@ -30,24 +30,32 @@ def serve(
     operator_service: OperatorService | None = None,
     layout: int = 0,
     explain: Callable[[Applied], str] = reason_alone,
+    is_attended: Callable[[], bool] | None = None,
 ) -> None:
     """Run the control loop until `stop` is set; `operator_service` answers what a person asks between two steps.
+
+    Where `is_attended` is given, a method that begins by itself stands until it is true: a hand is on the controls.
 
     `say` gets a line whenever what holds the robot changes; `explain` puts into words why it stands and what to do.
     """
     said: Reason | None = Reason.OK
+    stands = is_attended is not None and method.begins_alone
     while not stop.is_set():
         if loop.restarted():
             # Nothing of what was before belongs to what comes.
             method.reset()
             journal.ledger.new_episode()
-            stands = Applied(STOP, 0.0, reason=Reason.NEUTRAL_FIRST)
-            say(f"the robot was started anew; what was learned goes on. {explain(stands)}")
+            held = Applied(STOP, 0.0, reason=Reason.NEUTRAL_FIRST)
+            say(f"the robot was started anew; what was learned goes on. {explain(held)}")
         if operator_service is not None:
             operator_service.serve()
             if operator_service.paused:
                 loop.stand()
                 continue
+        if is_attended is not None and stands:
+            stands = not is_attended()
+            loop.stand()
+            continue
         step = loop.step(method)
         reason = None if step is None else step.applied.reason
         if reason is not said:

@@ -93,6 +93,11 @@ class Method(ABC):
         """Whether there is a policy under training."""
         return self.novice is not UNTAUGHT
 
+    @property
+    def begins_alone(self) -> bool:
+        """Whether somebody drives before a human has shown anything: then a hand has to be there first."""
+        return self.novice.stored > 0
+
     def reset(self) -> None:  # noqa: B027 - there may be nothing to forget
         """Forget what belongs to the past episode."""
 

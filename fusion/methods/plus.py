@@ -57,6 +57,11 @@ class LiraPlus(LiraSpf):
         self._driver, self._left = "", 0
 
     @property
+    def begins_alone(self) -> bool:
+        """Also where the experts fill the novice first."""
+        return self._plus.prefill > 0 or super().begins_alone
+
+    @property
     def offers(self) -> Mapping[str, Policy]:
         """Who can be given control."""
         return {expert.name: expert.act for expert in self.experts} if self._handover_steps else {}

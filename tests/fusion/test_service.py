@@ -140,3 +140,26 @@ def test_every_step_is_written_down_and_counted_as_training():
     assert twists == [Twist(0.5, 0.0)] * 3
     assert [record.decision.driver for record in written] == ["camera"] * 3
     assert {record.decision.phase for record in written} == {"train"}
+
+
+class Eager(Alone):
+    begins_alone = True
+
+
+@pytest.mark.parametrize(("looks", "moves"), [([False, False, True], 1), ([False, False, False], 0)])
+def test_a_method_that_begins_by_itself_stands_until_a_hand_is_there(looks, moves):
+    stop, told, twists = threading.Event(), list(looks), []
+
+    class Told(NullRobot):
+        def drive(self, command):
+            twists.append(command.twist)
+            if len(twists) > len(looks):
+                stop.set()
+            return super().drive(command)
+
+    def attended():
+        return bool(told) and told.pop(0)
+
+    serve(ControlLoop(Told(PROFILE)), Eager("plus", lambda _: GO), Journal(), stop, print, is_attended=attended)
+    assert all(twist == STOP for twist in twists[: len(looks)])
+    assert sum(twist != STOP for twist in twists) == moves

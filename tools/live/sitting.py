@@ -11,19 +11,17 @@ from lira.fusion.learning.trainer import ProcessTrainer
 from lira.fusion.log.recorder import Journal
 from lira.fusion.log.run_log import RunWriter, VerdictRecord
 from lira.fusion.operator_service import OperatorService
-from lira.hal.bus.bus import Bus
 from lira.hal.bus.topics import DECISION, SESSION
 from lira.hal.client.remote import RemoteRobot
 from lira.sim_backend.world import World
-from lira.tools.launch.lifetime import CLOSE_S, saving, stop_or_interrupt
+from lira.tools.launch.lifetime import saving, stop_or_interrupt
 from lira.tools.live.classroom import Classroom
-from lira.tools.live.hand import Hand
 from lira.tools.live.session import LiveSession, Rules
 from lira.tools.operator.voice import explain
 from lira.tools.runs.course import Course
 from lira.tools.runs.folder import LABELS, RECORD, in_the_log
 from lira.tools.runs.progress import Say
-from lira.tools.runs.reach import FLOOR, request_line
+from lira.tools.runs.reach import FLOOR, hand_of, request_line
 from lira.tools.runs.teach import Plan
 
 
@@ -55,11 +53,10 @@ def sit(args: argparse.Namespace, plan: Plan, robot: RemoteRobot, rules: Rules, 
             keep=room.keep, write=record.write, publish=lambda decision: decisions.put(decision, robot.now())
         )
         room.go_on(journal.ledger)
-        watch = Bus(args.name, connect=args.connect, watch=True)
-        stack.callback(watch.close, CLOSE_S)
+        hand = stack.enter_context(hand_of(args))
         truth = None if arena is None else robot.link.state
         session = LiveSession(
-            *(robot, arena, course, ControlLoop(robot, truth=truth), room, journal, Hand(watch), rules, say),
+            *(robot, arena, course, ControlLoop(robot, truth=truth), room, journal, hand, rules, say),
             publish=lambda state: sessions.put(state, robot.now()),
             explain=explain,
         )

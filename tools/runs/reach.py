@@ -16,6 +16,7 @@ from lira.hal.messages import Decision, Episode
 from lira.hal.port import Arena
 from lira.sim_backend.world import World
 from lira.tools.launch.lifetime import CLOSE_S
+from lira.tools.live.hand import Hand
 
 FLOOR = "floor"  # the world of a robot that is in none of ours
 NO_TWIN = "Here, a person teaches (--teacher none), and a policy drives without --unseen."
@@ -49,6 +50,16 @@ def request_line(robot: RemoteRobot, args: argparse.Namespace) -> Iterator[Reque
     watch = Bus(args.name, connect=args.connect, watch=True)
     try:
         yield RequestLine(robot.bus, watch, robot.now)
+    finally:
+        watch.close(CLOSE_S)
+
+
+@contextmanager
+def hand_of(args: argparse.Namespace) -> Iterator[Hand]:
+    """Listen to whether a hand drives."""
+    watch = Bus(args.name, connect=args.connect, watch=True)
+    try:
+        yield Hand(watch)
     finally:
         watch.close(CLOSE_S)
 

@@ -17,7 +17,7 @@ from lira.tools.operator.voice import explain
 from lira.tools.runs.build import NewTrainer, build_method
 from lira.tools.runs.folder import LABELS, RECORD, snapshot
 from lira.tools.runs.progress import Publish, Say
-from lira.tools.runs.reach import request_line, restarter, world_of
+from lira.tools.runs.reach import hand_of, request_line, restarter, world_of
 from lira.tools.runs.teach import Plan
 
 
@@ -41,7 +41,7 @@ def learn_from_person(
                 if old.stored:
                     novice.remember(Label(old.features, old.action, old.source, novice.weight(old.source)))
             journal, loop = Journal(keep=log.append, write=record.write, publish=publish), ControlLoop(robot)
-            with stop_or_interrupt() as stop, request_line(robot, args) as line:
+            with stop_or_interrupt() as stop, request_line(robot, args) as line, hand_of(args) as hand:
                 service = OperatorService(
                     line,
                     loop,
@@ -64,5 +64,6 @@ def learn_from_person(
                         operator_service=service,
                         explain=explain,
                         layout=args.layout,
+                        is_attended=lambda: hand.holds,
                     )
     return 0
