@@ -62,7 +62,7 @@ def test_a_button_that_is_pressed_while_the_pad_comes_asks_nothing_until_it_was_
 
 
 def test_no_other_button_asks():
-    others = set(PS3.buttons) - {"BTN_WEST", "BTN_NORTH", "BTN_EAST", *PS3.experts}
+    others = set(PS3.buttons) - {*PS3.asking, *PS3.experts}
     assert not any(itertools.chain(*asked([REST, pad(*others), REST])))
 
 
@@ -118,3 +118,9 @@ def test_a_time_out_that_was_learned_earlier_holds_from_the_first_event_until_a_
         watch.note(3.0 + 0.01 * (k + 1))
     assert watch.is_alive(3.0 + 0.01 * GAPS)
     assert watch.learned_s == watch.timeout_s == pytest.approx(0.1)
+
+
+def test_prove_is_asked_at_once_and_undo_when_held():
+    cross, thumb = pad(PS3.prove), pad(PS3.undo)
+    assert [request.request for request in itertools.chain(*asked([REST, cross, REST]))] == [Request.PROVE]
+    assert not any(itertools.chain(*asked([REST, thumb, REST])))

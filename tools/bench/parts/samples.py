@@ -31,7 +31,9 @@ from lira.hal.messages import (
     Range,
     Reason,
     Request,
+    SessionState,
     Source,
+    Stage,
     Twist,
     TwistStamped,
 )
@@ -87,6 +89,7 @@ MESSAGES: list[object] = [
     OperatorRequest(Request.PAUSE),
     OperatorRequest(Request.HANDOVER, "camera"),
     OperatorAnswer(1.5),
+    SessionState(1.5, Stage.PROVING, "ada", 3, 2, 1, 4, 5, 60, 7, 6, 0.75, (0.5, 1.0), 2, 3, "It drove 2 of 3"),
     OperatorAnswer(1.5, True, 3, False, "no expert is called 'sonar'"),
     JoyFeedback(JoyFeedback.TYPE_RUMBLE, 10, 0.5),
     Bool(False),
