@@ -291,3 +291,36 @@ def test_applied_by_a_hand_is_a_hand():
     assert is_by_hand(Applied(None, 0.0, Source.TELEOP), 0.1)
     assert not is_by_hand(Applied(None, 0.0, Source.TELEOP), 1.0)
     assert not is_by_hand(Applied(None, 0.0, Source.POLICY), 0.1)
+
+
+class Planner:
+    """A teacher that always drives ahead."""
+
+    def __init__(self):
+        self.layouts = []
+
+    def reset(self, layout):
+        self.layouts.append(layout)
+
+    def act(self, state, proposal, policy):
+        return 1.0, 0.0
+
+
+@pytest.mark.parametrize(
+    ("stage", "state", "action"),
+    [
+        (Stage.PRACTICE, TRUTH, (1.0, 0.0)),
+        (Stage.READY, TRUTH, (1.0, 0.0)),
+        (Stage.TEACHING, on(lost=True), None),
+        (Stage.PROVING, TRUTH, None),
+        (Stage.VERDICT, on(lost=True), (0.0, 0.0)),
+        (Stage.OVER, TRUTH, None),
+    ],
+)
+def test_a_scripted_person_has_its_hands_where_the_session_wants_them(stage, state, action):
+    from lira.hal.messages import SessionState
+    from lira.tools.live.scripted_person import Person
+
+    planner = Planner()
+    assert Person(planner, ()).act(state, None, SessionState(1.0, stage, layout=7)) == action
+    assert planner.layouts == [7]

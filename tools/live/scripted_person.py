@@ -88,12 +88,12 @@ class Person:
         if lap != self._lap:
             self._lap = lap
             self._teacher.reset(session.layout)
+        if session.stage is Stage.VERDICT:
+            return STAND  # a hand on the controls goes on
         if state.collided or state.lost or state.finished or session.stage in (Stage.PROVING, Stage.OVER):
             return None
         if session.stage in (Stage.PRACTICE, Stage.READY) or decision is None:
             return self._teach(state, None)
-        if session.stage is Stage.VERDICT:
-            return (0.0, 0.0)  # go on
         return self._teach(state, decision)
 
     def _teach(self, state: CourseState, decision: Decision | None) -> Action | None:
