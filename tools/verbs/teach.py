@@ -7,7 +7,7 @@ the pad. On a real robot you judge: passed, failed, or take over. U takes the la
 
 examples:
   lira teach --as ada                                  on a twin; then, in another shell: lira web
-  lira teach --as ada --speed 0.5                      at half speed, for the first time
+  lira teach --as ada --speed 0.7                      slower than real time, for the first time
   lira teach --as ada --run runs/teach-ada             go on another day: labels and counts go on
   lira teach --connect 192.168.1.20:7447 --as ada      a robot that is there
   lira teach --world line-obstacles --person scripted  a script drives by teleop as a hand would, at 2.5 times real time
@@ -32,6 +32,8 @@ if TYPE_CHECKING:
     from lira.tools.runs.teach import Plan
 
 SCRIPT_SPEED = 2.5
+# Slower, a client's estimate of the twin's clock runs so far ahead of it that commands would be refused.
+SLOWEST, FASTEST = 0.7, 5.0
 READY_S = 90.0
 NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_-]{0,31}")
 
@@ -48,8 +50,8 @@ def _speed(text: str) -> float:
         value = float(text)
     except ValueError:
         value = 0.0
-    if not 0.1 <= value <= 5.0:
-        raise argparse.ArgumentTypeError(f"'{text}' is no speed: 0.1 to 5")
+    if not SLOWEST <= value <= FASTEST:
+        raise argparse.ArgumentTypeError(f"'{text}' is no speed: {SLOWEST:g} to {FASTEST:g}")
     return value
 
 
