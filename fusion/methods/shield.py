@@ -128,6 +128,11 @@ class Shielded(Method):
         return lambda features: self._shield(inner(features), features.scan)
 
     @property
+    def begins_alone(self) -> bool:
+        """As without a shield."""
+        return self._method.begins_alone
+
+    @property
     def calls_alone(self) -> bool:
         """As without a shield: one that stands since no way is clear is as mute as any robot that nobody watches."""
         return self._method.calls_alone
