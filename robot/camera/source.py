@@ -11,7 +11,7 @@ EXTRAS = {"openni": "robot", "av": "video"}  # which part of the installation br
 
 
 def open_source(url: str, size: tuple[int, int], openni_folder: Path | None, *, depth: bool = False) -> Source:
-    """Open `openni:`, `http(s)://` (MJPEG), `rtsp://`, `/dev/video0` or a folder of images.
+    """Open `openni:`, `http(s)://` (MJPEG), `rtsp://`, `/dev/video0`, a video file or a folder of images.
 
     `size` (width, height) is asked of sources that have a choice. Raises `DeviceError`; `ConfigError` for a URL of none
     of these forms, or one of a source that has no `depth`; `MissingExtraError` if it needs what is not installed.
@@ -33,7 +33,7 @@ def open_source(url: str, size: tuple[int, int], openni_folder: Path | None, *, 
     if source is None:
         raise ConfigError(
             f"'{shown(url)}' is no camera",
-            "Use openni: (Astra), /dev/video0 (UVC), http://... (MJPEG), rtsp://..., or a folder of images.",
+            "Use openni: (Astra), /dev/video0 (UVC), http://... (MJPEG), rtsp://..., a video, or a folder of images.",
         )
     return source
 
@@ -56,4 +56,8 @@ def _open(url: str, scheme: str, size: tuple[int, int], openni_folder: Path | No
         from lira.robot.camera.folder import FolderSource
 
         return FolderSource(Path(url))
+    if Path(url).is_file():
+        from lira.robot.camera.film import FilmSource
+
+        return FilmSource(Path(url), size)
     return None

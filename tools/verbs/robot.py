@@ -36,7 +36,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add(
         "--camera",
         metavar="URL",
-        help="openni: (Astra), /dev/video0 (UVC), http://... (MJPEG), rtsp://..., or a folder of images",
+        help="openni: (Astra), /dev/video0 (UVC), http://... (MJPEG), rtsp://..., a video or a folder of images",
     )
     add(
         "--without",
