@@ -121,6 +121,7 @@ def contrast(first, second):
 
 @pytest.mark.parametrize("situation", Situation)
 def test_all_words_fit_into_the_banner(situation):
+    pygame.font.init()
     words = vocabulary("en")[situation]
     surface = pygame.Surface(SIZE)
     surface.fill((1, 2, 3))
