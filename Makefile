@@ -4,7 +4,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 SEEDS := 10
 WORKERS := 2
-TEST_WORKERS := 6
+TEST_WORKERS := 4
 EXPERTS := $(foreach task,line eight passage garden corridor,camera:--task:$(task)) \
   $(foreach task,line passage garden,lidar:--task:$(task)) depth:--task:table-top
 BENCHES := twin lockstep latency train preprocess step log drivers takeover
