@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from lira.hal.messages import Episode
+from lira.hal.messages import Command, Episode, Twist
 from lira.hal.profile import load_profile
 from lira.hal.server.server import stop_on_signal
 from lira.robot.core2.rosserial import ASK_TOPICS
@@ -108,6 +108,10 @@ class Devices(WiredTwin):
     def reset_board(self, boot_s: float) -> None:
         """Press the board's reset button; it is up again after `boot_s`."""
         self.board.soon.put(lambda: self.base.reset(boot_s))
+
+    def _drive(self, twist: Twist) -> None:
+        """Note what the base gives the wheels as it is: wheels that swing would blur the mark of who commanded it."""
+        self.twin.drive(Command(twist, self.twin.now()))
 
     def _distances(self, theta_rad: Floats) -> Floats:
         distances = super()._distances(theta_rad)
