@@ -98,11 +98,6 @@ class LiraSpf(Method):
         """Line 1: S is empty, so nobody is active until it holds J actions."""
         self._s: list[deque[Action]] = [deque(maxlen=self._j) for _ in self.experts]
 
-    @property
-    def begins_alone(self) -> bool:
-        """Also where the experts drive first."""
-        return self.settings.start == "experts" or super().begins_alone
-
     def update(self, now_s: float) -> None:
         """Line 25, with the training itself elsewhere."""
         self.novice.update(now_s)

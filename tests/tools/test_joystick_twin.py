@@ -131,11 +131,6 @@ def test_a_person_pauses_saves_chooses_and_begins_anew_with_the_pad(bed, hand, w
     decisions, applied = watch.reader(DECISION), watch.reader(APPLIED, depth=64)
     state, answers = watch.reader(SIM_STATE), watch.reader(OPERATOR_ANSWER)
     with learner(address, tmp_path, "--method", "lira", "--start", "experts") as process:
-        newest(decisions, lambda _: True, READY_S)
-        bed.key(PAD, "BTN_TL", 1)  # it does not drive off before a hand is there
-        hand.wait_ready("you drive", 10.0)
-        newest(applied, lambda a: a.source is Source.TELEOP)
-        bed.key(PAD, "BTN_TL", 0)
         newest(state, lambda s: s.progress_m > 1.0, READY_S)
 
         press(bed, "BTN_WEST")
