@@ -39,7 +39,7 @@ from lira.tools.joystick.axes import action_of
 from lira.tools.joystick.client import TeleopClient
 from lira.tools.launch.processes import ChildProcess, free_port, lira_command
 from lira.tools.operator.listen import Ears
-from lira.tools.operator.situation import URGENCY, Situation, Urgency
+from lira.tools.operator.situation import CORNERS, URGENCY, Situation, Urgency
 from lira.tools.operator.tones import TONES
 from lira.tools.operator.view import View
 from lira.tools.operator.voice import Voice, verdict, vocabulary
@@ -47,7 +47,7 @@ from lira.tools.operator.voice import Voice, verdict, vocabulary
 os.environ["SDL_VIDEODRIVER"] = os.environ["SDL_AUDIODRIVER"] = "dummy"
 
 pygame = pytest.importorskip("pygame", reason="needs pygame: pip install 'lira-rosbot[console]'")
-from lira.tools.console.draw import BANNER, SIGNS, SIZE, draw, draw_voice, fan  # noqa: E402
+from lira.tools.console.draw import BANNER, COLOURS, SIZE, draw, draw_voice, fan  # noqa: E402
 from lira.tools.console.palette import AMBER, GREEN, PANEL, RED, SKY  # noqa: E402
 from lira.tools.console.screen import check_screen, fitted, window_size  # noqa: E402
 from lira.tools.console.window import Keyboard  # noqa: E402
@@ -104,8 +104,8 @@ def test_what_needs_a_person_fills_the_banner_with_its_colour(name):
 
 
 def test_letters_can_be_read_on_every_colour():
-    for colour, ink, corners in SIGNS.values():
-        assert contrast(ink, colour if corners else PANEL) >= 4.5
+    for urgency, (colour, ink) in COLOURS.items():
+        assert contrast(ink, colour if urgency in CORNERS else PANEL) >= 4.5
 
 
 def contrast(first, second):

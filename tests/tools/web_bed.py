@@ -46,8 +46,8 @@ def policy(name, endpoint):
 
 
 @contextlib.contextmanager
-def page_of_robot(folder, *, with_policy=True):
-    """The bus, the page's address, and `lira web` as a process."""
+def page_of_robot(folder):
+    """The bus, the page's address, and `lira web` as a process, while a policy drives the robot."""
     name, endpoint, port = f"web{os.getpid()}", f"127.0.0.1:{free_port()}", free_port()
     robot = [sys.executable, "-m", "lira.tools.bench.parts.null_robot", name, endpoint]
     with contextlib.ExitStack() as stack:
@@ -55,8 +55,7 @@ def page_of_robot(folder, *, with_policy=True):
         server.wait_ready(null_robot.READY, 30.0)
         bus = Bus(name, connect=endpoint)
         stack.callback(bus.close)
-        if with_policy:
-            stack.enter_context(policy(name, endpoint))
+        stack.enter_context(policy(name, endpoint))
         words = ["--name", name, "--connect", endpoint, "--port", str(port)]
         web = stack.enter_context(ChildProcess("lira web", lira_command("web", *words), folder / "web.log"))
         web.wait_ready("web shows", 30.0)
@@ -64,8 +63,8 @@ def page_of_robot(folder, *, with_policy=True):
 
 
 @contextlib.contextmanager
-def browser(*, width=1366, height=768):
-    """Chromium without a screen. `script` of a page may be given by `tell_at_start`."""
+def browser():
+    """Chromium without a screen."""
     from selenium import webdriver
     from selenium.webdriver.chrome.service import Service
 
@@ -74,7 +73,7 @@ def browser(*, width=1366, height=768):
     options.set_capability("goog:loggingPrefs", {"browser": "ALL"})
     for flag in ("--headless=new", "--no-sandbox", "--disable-gpu", "--disable-dev-shm-usage"):
         options.add_argument(flag)
-    options.add_argument(f"--window-size={width},{height}")
+    options.add_argument("--window-size=1366,768")
     driver = webdriver.Chrome(options=options, service=Service(shutil.which("chromedriver")))
     try:
         yield driver
@@ -106,10 +105,6 @@ class Applied:
             if time.monotonic() >= until_s:
                 return self.all
             time.sleep(0.02)
-
-    def forget(self):
-        self.listen()
-        self.all = []
 
     def by_hand(self):
         """Whether a hand moves it now."""

@@ -22,19 +22,19 @@ from lira.tools.console.palette import (
     write_lines,
 )
 from lira.tools.console.picture import pixels_of
-from lira.tools.operator.situation import Urgency
-from lira.tools.operator.view import LOW_V, STALE_S, View, battery_share
+from lira.tools.operator.situation import CORNERS, Urgency
+from lira.tools.operator.view import LOW_V, STALE_S, View, battery_share, beams_ahead
 from lira.tools.operator.voice import Voice, progress_words, speak, verdict
 
 SIZE = (1280, 680)  # fits a screen of 1366 by 768 with a desktop's bar and a window's frame
-# How loud a situation is, by colour, by the colour of the letters and by shape (corners of the sign; 0: a bar alone).
-SIGNS: dict[Urgency, tuple[tuple[int, int, int], tuple[int, int, int], int]] = {
-    Urgency.IDLE: (DIM, TEXT, 0),
-    Urgency.CALM: (GREEN, TEXT, 0),
-    Urgency.WATCH: (AMBER, INK, 3),
-    Urgency.ASK: (SKY, INK, 4),
-    Urgency.NEED: (AMBER, INK, 4),
-    Urgency.ALARM: (RED, WHITE, 8),
+# How loud a situation is, by colour and the colour of the letters on it; without a sign the colour is a bar.
+COLOURS: dict[Urgency, tuple[tuple[int, int, int], tuple[int, int, int]]] = {
+    Urgency.IDLE: (DIM, TEXT),
+    Urgency.CALM: (GREEN, TEXT),
+    Urgency.WATCH: (AMBER, INK),
+    Urgency.ASK: (SKY, INK),
+    Urgency.NEED: (AMBER, INK),
+    Urgency.ALARM: (RED, WHITE),
 }
 BANNER = pygame.Rect(560, 16, 704, 176)
 
@@ -88,26 +88,18 @@ def draw_scan(surface: pygame.Surface, box: pygame.Rect, view: View) -> None:
 def fan(
     scan: LaserScan, fov_rad: float, max_range_m: float, origin: tuple[float, float], reach_px: float
 ) -> list[tuple[tuple[int, int], float]]:
-    """Points on the screen for the beams ahead, left to right on the screen, each with its share of the range.
-
-    No return is the full range; what is invalid is left out.
-    """
+    """Points on the screen for the beams ahead, left to right on the screen, each with its share of the range."""
     points = []
-    for index in range(len(scan.ranges) - 1, -1, -1):
-        angle = scan.angle_min + index * scan.angle_increment
-        angle = math.atan2(math.sin(angle), math.cos(angle))
-        distance_m = float(scan.ranges[index])
-        if abs(angle) > fov_rad / 2 + 1e-6 or math.isnan(distance_m) or distance_m < 0.0:
-            continue
-        share = min(1.0, distance_m / max_range_m)
+    for angle, distance_m in reversed(beams_ahead(scan, fov_rad, max_range_m)):
+        share = distance_m / max_range_m
         x, y = origin[0] - math.sin(angle) * share * reach_px, origin[1] - math.cos(angle) * share * reach_px
-        points.append((angle, (round(x), round(y)), share))
-    return [(point, share) for _, point, share in sorted(points, reverse=True)]
+        points.append(((round(x), round(y)), share))
+    return points
 
 
 def draw_voice(surface: pygame.Surface, box: pygame.Rect, voice: Voice) -> None:
     """Who drives, why, and what to do now. What needs a person fills the box and has a sign; the rest has a bar."""
-    colour, ink, corners = SIGNS[voice.urgency]
+    (colour, ink), corners = COLOURS[voice.urgency], CORNERS.get(voice.urgency, 0)
     pygame.draw.rect(surface, colour if corners else PANEL, box, border_radius=6)
     left = box.x + (112 if corners else 26)
     if corners:

@@ -25,12 +25,11 @@ class Ears:
         self._answer, self._truth = watch.reader(OPERATOR_ANSWER), watch.reader(SIM_STATE)
         self._session = watch.reader(SESSION)
         self._answered, self._verdict_s = 0, -math.inf
-        features, base = profile.features, profile.base
+        features = profile.features
         self._view = View(
             watch.robot,
             fov_rad=features.fov_rad,
             max_range_m=features.max_range_m,
-            limits=(base.max_linear_m_s, base.max_angular_rad_s),
         )
 
     def look(self) -> View:

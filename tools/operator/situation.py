@@ -75,6 +75,9 @@ class Urgency(StrEnum):
     ALARM = "alarm"  # the emergency stop is pressed, or nothing is known of the robot
 
 
+# Corners of the sign beside the words, so that nobody depends on colours; what needs nobody has none.
+CORNERS = {Urgency.WATCH: 3, Urgency.ASK: 4, Urgency.NEED: 4, Urgency.ALARM: 8}
+
 _S = Situation
 URGENCY: dict[Situation, Urgency] = {
     **dict.fromkeys(Situation, Urgency.CALM),

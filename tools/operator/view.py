@@ -1,6 +1,7 @@
 """Everything that is known of a robot and of who drives it, as one value. Pure: times come in as arguments."""
 
-from dataclasses import dataclass, field
+import math
+from dataclasses import dataclass
 
 from lira.hal.bus.topics import OPERATOR_ANSWER, SESSION
 from lira.hal.messages import (
@@ -55,7 +56,6 @@ class View:
     hand: str | None = None
     fov_rad: float = 2.269
     max_range_m: float = 4.0
-    limits: tuple[float, float] = field(default=(1.0, 1.0))
 
     @property
     def linked(self) -> bool:
@@ -86,6 +86,19 @@ class View:
     def paused(self) -> bool:
         """Whether driving and learning wait for a person."""
         return self.answering is not None and self.answering.paused
+
+
+def beams_ahead(scan: LaserScan, fov_rad: float, max_range_m: float) -> list[tuple[float, float]]:
+    """What the learner sees of a scan: (angle in rad, distance in m) from right to left.
+
+    No return is the full range; what is invalid is left out.
+    """
+    beams = []
+    for index, distance_m in enumerate(scan.ranges.tolist()):
+        angle = math.remainder(scan.angle_min + index * scan.angle_increment, 2 * math.pi)
+        if abs(angle) <= fov_rad / 2 + 1e-6 and distance_m >= 0.0:
+            beams.append((angle, min(distance_m, max_range_m)))
+    return sorted(beams)
 
 
 def battery_share(battery: BatteryState) -> float:

@@ -12,10 +12,8 @@ examples:
 """
 
 import argparse
-import contextlib
 from pathlib import Path
 
-from lira.tools.launch.lifetime import CLOSE_S, stop_or_interrupt
 from lira.tools.options import add_client
 
 ANSWER_S = 10.0
@@ -43,21 +41,12 @@ def run(args: argparse.Namespace) -> int:
         print(f"written: {args.screenshot}")
         return 0
 
-    from lira.hal.bus.bus import Bus
-    from lira.hal.bus.services import LOCKSTEP, info_from_json
-    from lira.hal.bus.topics import INFO
-    from lira.tools.joystick.client import TeleopClient
+    from lira.tools.operator.beside import beside
     from lira.tools.operator.listen import Ears
 
-    with contextlib.ExitStack() as stack:
-        bus = Bus(args.name, connect=args.connect)
-        stack.callback(bus.close, CLOSE_S)
-        stop = stack.enter_context(stop_or_interrupt())
-        info = info_from_json(bus.ask(INFO, timeout_s=ANSWER_S))
-        watch = Bus(args.name, connect=args.connect, watch=True)
-        stack.callback(watch.close, CLOSE_S)
-        by_hand = info.mode != LOCKSTEP and not args.no_keyboard  # no hand follows lockstep
-        keyboard = Keyboard(TeleopClient(bus, watch, ANSWER_S)) if by_hand else None
+    with beside(args.name, args.connect) as robot:
+        client = None if args.no_keyboard else robot.client()
+        keyboard = None if client is None else Keyboard(client)
         print(f"console shows '{args.name}' at {args.connect}", flush=True)
-        show(Ears(watch, info.profile).look, keyboard, stop)
+        show(Ears(robot.watch, robot.info.profile).look, keyboard, robot.stop)
     return 0

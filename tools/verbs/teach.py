@@ -25,6 +25,7 @@ from datetime import datetime
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from lira.hal.bus.endpoint import DEFAULT_ENDPOINT, DEFAULT_ROBOT
 from lira.hal.errors import ConfigError
 from lira.tools.options import DEFAULT, add_expert, add_layout, add_seed, natural
 
@@ -62,8 +63,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add("--world", default="line-obstacles", help=f"the twin's world by name or .toml file {DEFAULT}")
     add("--profile", help="the twin's robot (default: that of the world's experiment)")
     add("--connect", metavar="HOST:PORT", help="teach the robot or the twin that is there, instead of starting a twin")
-    add("--name", default="rosbot", help=f"the robot's name on the bus {DEFAULT}")
-    add("--listen", default="127.0.0.1:7447", metavar="HOST:PORT", help=f"where the twin listens {DEFAULT}")
+    add("--name", default=DEFAULT_ROBOT, help=f"the robot's name on the bus {DEFAULT}")
+    add("--listen", default=DEFAULT_ENDPOINT, metavar="HOST:PORT", help=f"where the twin listens {DEFAULT}")
     add("--speed", type=_speed, help="of the twin, times real time (default: 1; with a scripted person 2.5)")
     add("--method", default="plus", help=f"way of teaching, as in `lira fusion` {DEFAULT}")
     add("--practice", type=float, metavar="S", help="seconds of driving before it counts (default: 15, scripted: 2)")
@@ -94,6 +95,7 @@ def run(args: argparse.Namespace) -> int:
     from lira.tools.launch.lifetime import CLOSE_S
     from lira.tools.live.session import Rules
     from lira.tools.live.sitting import sit
+    from lira.tools.runs.reach import say
 
     scripted = args.person != "hand"
     args.run = args.run or Path("runs") / f"teach-{args.who}-{datetime.now():%Y%m%d-%H%M%S}"
@@ -150,6 +152,7 @@ def robot_of(args: argparse.Namespace) -> Iterator[None]:
     from lira.sim_backend.scenes.opening import quickest
     from lira.tools.launch.launch import direct, running
     from lira.tools.launch.processes import free_port
+    from lira.tools.runs.reach import say
 
     if args.connect is not None:
         yield
@@ -193,8 +196,3 @@ def conclude(folder: Path, passed: bool | None) -> int:
     print(f"report: {write_report(folder)}")
     print(f"go on another day: lira teach --run {shlex.quote(str(folder))}")
     return 1 if passed is False else 0
-
-
-def say(line: str) -> None:
-    """Print a line at once."""
-    print(line, flush=True)

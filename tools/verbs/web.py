@@ -23,22 +23,19 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from lira.tools.launch.lifetime import CLOSE_S, stop_or_interrupt
+from lira.tools.options import DEFAULT, add_client, add_layout
 
 if TYPE_CHECKING:
     from lira.tools.web.access import Access
-
-ANSWER_S = 10.0
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
     add = parser.add_argument
-    add("--name", default="rosbot", help="the robot's name on the bus (default: %(default)s)")
-    add("--connect", default="127.0.0.1:7447", metavar="HOST:PORT", help="where the robot is (default: %(default)s)")
-    add("--listen", default="127.0.0.1", metavar="HOST", help="where the page is served (default: %(default)s)")
-    add("--port", type=_port, default=8080, help="0 takes any that is free (default: %(default)s)")
-    add("--layout", type=int, default=0, help="the twin's layout, for the map (default: %(default)s)")
+    add_client(parser)
+    add("--listen", default="127.0.0.1", metavar="HOST", help=f"where the page is served {DEFAULT}")
+    add("--port", type=_port, default=8080, help=f"0 takes any that is free {DEFAULT}")
+    add_layout(parser, "the twin's layout, for the map")
     add("--screenshot", type=Path, metavar="FILE", help="write a picture of the page with a sample drive, and end")
 
 
@@ -57,11 +54,8 @@ def run(args: argparse.Namespace) -> int:
         print(f"written: {args.screenshot}")
         return 0
 
-    from lira.hal.bus.bus import Bus
     from lira.hal.bus.keys import keys_from_environment
-    from lira.hal.bus.services import LOCKSTEP, info_from_json
-    from lira.hal.bus.topics import INFO
-    from lira.tools.joystick.client import TeleopClient
+    from lira.tools.operator.beside import beside
     from lira.tools.operator.listen import Ears
     from lira.tools.web.access import Access, own_names, tls_context
     from lira.tools.web.controls import Controls
@@ -72,21 +66,13 @@ def run(args: argparse.Namespace) -> int:
     tls = tls_context(keys_from_environment(), args.listen)
     access = Access(open_here=tls is None, hosts=own_names(args.listen))
     with contextlib.ExitStack() as stack:
-        bus = Bus(args.name, connect=args.connect)
-        stack.callback(bus.close, CLOSE_S)
-        stop = stack.enter_context(stop_or_interrupt())
-        info = info_from_json(bus.ask(INFO, timeout_s=ANSWER_S))
-        watch = Bus(args.name, connect=args.connect, watch=True)
-        stack.callback(watch.close, CLOSE_S)
-        ears, seat = Ears(watch, info.profile), Seat()
-        controls = None
-        if info.mode != LOCKSTEP:  # no hand follows lockstep
-            controls = Controls(TeleopClient(bus, watch, ANSWER_S), seat)
-            stack.callback(controls.close)
-        settings = partial(settings_of, info, args.name, args.layout)
+        robot = stack.enter_context(beside(args.name, args.connect))
+        ears, seat, client = Ears(robot.watch, robot.info.profile), Seat(), robot.client()
+        controls = None if client is None else stack.enter_context(contextlib.closing(Controls(client, seat)))
+        settings = partial(settings_of, robot.info, args.name, args.layout)
         server = PageServer(ears.look, seat, access, controls, settings)
         tell = partial(_tell, args, access)
-        asyncio.run(serve_page(server, args.listen, args.port, tls, tell, stop))
+        asyncio.run(serve_page(server, args.listen, args.port, tls, tell, robot.stop))
     return 0
 
 

@@ -5,7 +5,7 @@ import math
 import msgspec
 
 from lira.hal.messages import Action, Driver, LaserScan
-from lira.tools.operator.view import STALE_S, View, battery_share
+from lira.tools.operator.view import STALE_S, View, battery_share, beams_ahead
 from lira.tools.operator.voice import progress_words, speak, verdict
 
 BEAMS = 180  # as many as a fan on a small screen can show
@@ -134,14 +134,10 @@ def counts_of(view: View) -> Counts | None:
 
 
 def points_of(scan: LaserScan, view: View) -> tuple[tuple[float, float], ...]:
-    """What the learner sees of a scan: ahead only, cut at its range; what is invalid is left out."""
-    kept = []
-    for index, distance_m in enumerate(scan.ranges.tolist()):
-        angle = math.remainder(scan.angle_min + index * scan.angle_increment, 2 * math.pi)
-        if abs(angle) <= view.fov_rad / 2 + 1e-6 and distance_m >= 0.0:
-            kept.append((round(angle, 3), round(min(distance_m, view.max_range_m), 3)))
-    step = max(1, math.ceil(len(kept) / BEAMS))
-    return tuple(sorted(kept)[::step])
+    """The beams ahead, no more of them than can be told apart."""
+    beams = beams_ahead(scan, view.fov_rad, view.max_range_m)
+    step = max(1, math.ceil(len(beams) / BEAMS))
+    return tuple((round(angle, 3), round(distance_m, 3)) for angle, distance_m in beams[::step])
 
 
 def pose_of(view: View) -> tuple[float, float, float] | None:

@@ -1,4 +1,4 @@
-"""What a page is told once: words, sounds, what shakes how, the robot's limits, and the map."""
+"""What a page is told once: words, sounds, what shakes how, the signs, and the map."""
 
 import tomllib
 from functools import cache
@@ -8,6 +8,7 @@ from typing import Any
 from lira.hal.bus.services import Info
 from lira.hal.errors import ConfigError
 from lira.tools.joystick.rumble import PATTERNS
+from lira.tools.operator.situation import CORNERS
 from lira.tools.operator.tones import TONES
 from lira.tools.web.floor import floor_of
 
@@ -16,14 +17,14 @@ WORDS = Path(__file__).parent / "words"
 
 def settings_of(info: Info, robot: str, usual: int, language: str, layout: int | None = None) -> dict[str, Any]:
     """Everything in one table. Times of what shakes are in milliseconds, on and off in turn, as browsers have it."""
-    base, features = info.profile.base, info.profile.features
+    features = info.profile.features
     return {
         "robot": robot,
         "language": language,
         "words": labels(language),
         "tones": {str(urgency): tones for urgency, tones in TONES.items()},
         "shakes": {str(urgency): [round(1e3 * length_s) for _, length_s in way] for urgency, way in PATTERNS.items()},
-        "limits": [base.max_linear_m_s, base.max_angular_rad_s],
+        "corners": {str(urgency): corners for urgency, corners in CORNERS.items()},
         "fov_rad": features.fov_rad,
         "max_range_m": features.max_range_m,
         "floor": floor_of(info, usual if layout is None else layout),

@@ -4,7 +4,6 @@ import { Hands } from "/static/hands.js";
 
 const RETRY_MS = 500;
 const SILENT_MS = 1000; // without a frame for so long the page says so itself
-const CORNERS = { watch: 3, ask: 4, need: 4, alarm: 8 };
 
 const at = (selector) => document.querySelector(selector);
 const language = (navigator.language || "en").slice(0, 2);
@@ -84,7 +83,7 @@ function tell(urgency, who, why, now) {
   if (urgency === loud) return;
   loud = urgency;
   document.body.dataset.urgency = urgency;
-  at("#sign polygon").setAttribute("points", corners(CORNERS[urgency] || 0));
+  at("#sign polygon").setAttribute("points", corners(settings.corners[urgency] || 0));
   if (navigator.userActivation?.hasBeenActive && navigator.vibrate && settings.shakes[urgency]) navigator.vibrate(settings.shakes[urgency]);
   if (settings.tones[urgency]) sound(settings.tones[urgency]);
 }

@@ -1,0 +1,40 @@
+"""A screen beside the robot: the sessions it needs, until it is told to end."""
+
+import contextlib
+import threading
+from collections.abc import Iterator
+from typing import NamedTuple
+
+from lira.hal.bus.bus import Bus
+from lira.hal.bus.services import LOCKSTEP, Info, info_from_json
+from lira.hal.bus.topics import INFO
+from lira.tools.joystick.client import TeleopClient
+from lira.tools.launch.lifetime import CLOSE_S, stop_or_interrupt
+
+ANSWER_S = 10.0
+
+
+class Beside(NamedTuple):
+    """`bus` is for what is sent, `watch` hears everybody, `stop` is set by a signal."""
+
+    bus: Bus
+    watch: Bus
+    info: Info
+    stop: threading.Event
+
+    def client(self) -> TeleopClient | None:
+        """What drives by hand; None beside a robot in lockstep, which no hand follows."""
+        return None if self.info.mode == LOCKSTEP else TeleopClient(self.bus, self.watch, ANSWER_S)
+
+
+@contextlib.contextmanager
+def beside(name: str, endpoint: str) -> Iterator[Beside]:
+    """Open the sessions. Raises `BusError` if no robot answers."""
+    with contextlib.ExitStack() as stack:
+        bus = Bus(name, connect=endpoint)
+        stack.callback(bus.close, CLOSE_S)
+        stop = stack.enter_context(stop_or_interrupt())
+        info = info_from_json(bus.ask(INFO, timeout_s=ANSWER_S))
+        watch = Bus(name, connect=endpoint, watch=True)
+        stack.callback(watch.close, CLOSE_S)
+        yield Beside(bus, watch, info, stop)
