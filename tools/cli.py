@@ -30,6 +30,8 @@ EXTRAS = {
     "threadpoolctl": "drive",
     "pygame": "console",
     "cryptography": "keys",
+    "mcap": "record",
+    "zstandard": "record",
 }
 
 EXIT_ERROR = 2
