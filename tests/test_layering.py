@@ -23,6 +23,7 @@ ROOMS = {
         "clock": set(),
         "plugins": {"errors"},
         "messages": {"errors"},
+        "rmw": {"errors", "messages"},
         "profile": {"errors", "config", "messages"},
         "port": {"messages", "profile"},
         "bus": {"errors", "clock", "messages", "profile"},
