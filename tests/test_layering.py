@@ -27,6 +27,7 @@ ROOMS = {
         "profile": {"errors", "config", "messages"},
         "port": {"messages", "profile"},
         "bus": {"errors", "clock", "messages", "profile"},
+        "ros_graph": {"errors", "messages", "rmw", "bus"},
         "safety": {"clock", "messages", "profile", "port"},
         "server": {"errors", "clock", "messages", "profile", "port", "bus", "safety"},
         "client": {"errors", "clock", "messages", "profile", "bus"},

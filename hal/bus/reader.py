@@ -22,8 +22,8 @@ M = TypeVar("M")
 class Received(Generic[M]):
     """A message as it came. `arrived_s` is when it was polled, on this machine's monotonic clock.
 
-    `key` is the whole key that it came on. `sender` is the id of the session that put it, "" if that does not stamp
-    what it puts (ours and ROS bridges do).
+    `key` is the whole key that it came on, `attached` what was attached, whoever's it is. `sender` is the id of the
+    session that put it, "" if that does not stamp what it puts (ours and ROS bridges do).
     """
 
     message: M
@@ -31,6 +31,7 @@ class Received(Generic[M]):
     arrived_s: float
     key: str = ""
     sender: str = ""
+    attached: bytes | None = None
 
     @property
     def commander(self) -> str:
@@ -76,8 +77,9 @@ class Reader(Generic[M]):
             self._boundary.refuse(self._topic.key, "too long")
             return None
         message = decode(self._topic.kind, bytes(sample.payload))
-        sent = parse_attachment(None if attached is None else bytes(attached))
-        return Received(message, sent, time.monotonic(), str(sample.key_expr), self._sender(sample))
+        beside = None if attached is None else bytes(attached)
+        sent, arrived_s = parse_attachment(beside), time.monotonic()
+        return Received(message, sent, arrived_s, str(sample.key_expr), self._sender(sample), beside)
 
     def newest(self) -> Received[M] | None:
         """Return the newest message that ever came, however old it is."""
