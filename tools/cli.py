@@ -32,6 +32,8 @@ EXTRAS = {
     "cryptography": "keys",
     "mcap": "record",
     "zstandard": "record",
+    "foxglove": "view",
+    "prometheus_client": "view",
 }
 
 EXIT_ERROR = 2
