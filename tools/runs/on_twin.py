@@ -5,9 +5,10 @@ from functools import partial
 
 from lira.fusion.learning.trainer import ProcessTrainer
 from lira.hal.client.remote import RemoteRobot
+from lira.tools.runs.plan import Plan
 from lira.tools.runs.progress import Publish, Say
 from lira.tools.runs.reach import arena_of
-from lira.tools.runs.teach import Plan, teach_on
+from lira.tools.runs.teach import teach_on
 
 
 def teach(args: argparse.Namespace, plan: Plan, robot: RemoteRobot, publish: Publish, say: Say) -> int:

@@ -14,11 +14,11 @@ from lira.fusion.service import serve
 from lira.hal.client.remote import RemoteRobot
 from lira.tools.launch.lifetime import saving, stop_or_interrupt
 from lira.tools.operator.voice import explain
-from lira.tools.runs.build import NewTrainer, build_method
+from lira.tools.runs.build import NewTrainer
 from lira.tools.runs.folder import LABELS, RECORD, snapshot
+from lira.tools.runs.plan import Plan, build_traced
 from lira.tools.runs.progress import Publish, Say
 from lira.tools.runs.reach import hand_of, request_line, restarter, world_of
-from lira.tools.runs.teach import Plan
 
 
 def learn_from_person(
@@ -33,13 +33,13 @@ def learn_from_person(
         DemonstrationLog(folder / LABELS, profile, mirrored=plan.preset.mirrored, say=say) as log,
         RunWriter(folder / RECORD) as record,
     ):
-        method = build_method(plan.preset, profile, plan.seed, trainer, plan.pair or task_of(world), plan.more)
+        method = build_traced(plan, profile, trainer, plan.pair or task_of(world), publish)
         novice = method.novice
         with saving(lambda: snapshot(folder, novice, profile, head), say), contextlib.closing(method):
             record.write(head)
             for old in read_demonstrations(log.path):
                 if old.stored:
-                    novice.remember(Label(old.features, old.action, old.source, novice.weight(old.source)))
+                    method.remember(Label(old.features, old.action, old.source, novice.weight(old.source)))
             journal, loop = Journal(keep=log.append, write=record.write, publish=publish), ControlLoop(robot)
             with stop_or_interrupt() as stop, request_line(robot, args) as line, hand_of(args) as hand:
                 service = OperatorService(

@@ -13,8 +13,10 @@ examples:
 """
 
 import argparse
+import contextlib
 import shlex
 import sys
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -28,6 +30,7 @@ from lira.tools.options import (
     add_layout,
     add_pair,
     add_protocol,
+    add_record,
     add_seed,
     add_shield,
     natural,
@@ -35,7 +38,7 @@ from lira.tools.options import (
 
 if TYPE_CHECKING:
     from lira.hal.client.remote import RemoteRobot
-    from lira.tools.runs.teach import Plan
+    from lira.tools.runs.plan import Plan
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -55,6 +58,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_seed(parser, "seeds teacher and training")
     add = parser.add_argument
     add("--run", type=Path, metavar="DIR", help="folder for what is learned (default: runs/<method>)")
+    add_record(parser)
     add("--as-command", help=argparse.SUPPRESS)  # what a report shows as the command that repeats the run
 
 
@@ -97,22 +101,40 @@ def run(args: argparse.Namespace) -> int:
         raise ConfigError(f"by the method '{args.method}' nobody learns", "Show it on a twin with --teacher perfect.")
     torch.set_num_threads(1)
     one_thread()
-    with connect(args.connect, args.name, close_s=CLOSE_S) as robot:
+    with recorder_of(args, plan) as wait_for_it, connect(args.connect, args.name, close_s=CLOSE_S) as robot:
+        wait_for_it()
         if args.teacher == "none":
             return learn_by_hand(args, plan, robot)
         from lira.tools.runs.on_twin import teach
-        from lira.tools.runs.reach import decisions_of, say
+        from lira.tools.runs.reach import reports_of, say
 
-        return teach(args, plan, robot, decisions_of(robot), say)
+        return teach(args, plan, robot, reports_of(robot), say)
+
+
+@contextlib.contextmanager
+def recorder_of(args: argparse.Namespace, plan: "Plan") -> Iterator[Callable[[], None]]:
+    """Record the run unless told not to; yields what waits for the recorder."""
+    from lira.tools.recording.beside import recorder_beside
+    from lira.tools.runs.folder import check_fresh
+    from lira.tools.runs.reach import say
+
+    assert plan.folder is not None
+    if args.teacher != "none":
+        check_fresh(plan.folder)
+    if args.no_record:
+        yield lambda: None
+        return
+    with recorder_beside(args.name, args.connect, plan.folder, say) as wait:
+        yield wait
 
 
 def learn_by_hand(args: argparse.Namespace, plan: "Plan", robot: "RemoteRobot") -> int:
     """Learn from whoever takes control."""
     from lira.fusion.learning.trainer import ProcessTrainer
-    from lira.tools.runs.reach import decisions_of, say
+    from lira.tools.runs.reach import reports_of, say
     from lira.tools.runs.with_person import learn_from_person
 
-    return learn_from_person(args, plan, robot, ProcessTrainer, decisions_of(robot), say)
+    return learn_from_person(args, plan, robot, ProcessTrainer, reports_of(robot), say)
 
 
 def plan_of(args: argparse.Namespace) -> "Plan":
@@ -121,7 +143,7 @@ def plan_of(args: argparse.Namespace) -> "Plan":
 
     from lira.fusion.methods.presets import file_name, method_named
     from lira.fusion.methods.syllabus import with_proof
-    from lira.tools.runs.teach import Plan
+    from lira.tools.runs.plan import Plan
 
     preset = method_named(args.method)
     if args.start is not None:

@@ -27,10 +27,10 @@ from typing import TYPE_CHECKING
 
 from lira.hal.bus.endpoint import DEFAULT_ENDPOINT, DEFAULT_ROBOT
 from lira.hal.errors import ConfigError
-from lira.tools.options import DEFAULT, add_expert, add_layout, add_seed, natural
+from lira.tools.options import DEFAULT, add_expert, add_layout, add_record, add_seed, natural
 
 if TYPE_CHECKING:
-    from lira.tools.runs.teach import Plan
+    from lira.tools.runs.plan import Plan
 
 SCRIPT_SPEED = 2.5
 # Slower, a client's estimate of the twin's clock runs so far ahead of it that commands would be refused.
@@ -84,6 +84,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="who drives: a hand, or on a twin a script with few, no or many human faults (for tests)",
     )
     add("--run", type=Path, metavar="DIR", help="folder of the session; one that is there goes on (default: a new one)")
+    add_record(parser)
 
 
 def run(args: argparse.Namespace) -> int:
@@ -95,6 +96,7 @@ def run(args: argparse.Namespace) -> int:
     from lira.tools.launch.lifetime import CLOSE_S
     from lira.tools.live.session import Rules
     from lira.tools.live.sitting import sit
+    from lira.tools.recording.beside import recorder_beside
     from lira.tools.runs.reach import say
 
     scripted = args.person != "hand"
@@ -109,7 +111,10 @@ def run(args: argparse.Namespace) -> int:
     )
     with contextlib.ExitStack() as stack:
         stack.enter_context(robot_of(args))
+        heard = None if args.no_record else stack.enter_context(recorder_beside(args.name, args.connect, args.run, say))
         robot = stack.enter_context(connect(args.connect, args.name, close_s=CLOSE_S))
+        if heard is not None:
+            heard()
         if scripted:
             stack.enter_context(script_of(args))
         else:
@@ -124,7 +129,7 @@ def plan_of(args: argparse.Namespace) -> "Plan":
 
     from lira.fusion.methods.presets import method_named
     from lira.fusion.methods.syllabus import THESIS
-    from lira.tools.runs.teach import Plan
+    from lira.tools.runs.plan import Plan
 
     preset = method_named(args.method)
     if not preset.approach.learns:
