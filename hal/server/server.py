@@ -31,7 +31,8 @@ class HalServer:
     """Serves `robot` until told to stop. It opens and closes the robot; the bus stays the caller's.
 
     `arena` is the twin behind the robot, if there is one, and `arena_info` JSON about its world for whoever asks.
-    `ready`, if given, is called once the robot answers.
+    `ready`, if given, is called once the robot answers; in real time `alive` over and over by the thread that moves the
+    wheels, so it must not wait.
     """
 
     def __init__(
@@ -43,12 +44,14 @@ class HalServer:
         arena_info: bytes = b"null",
         lockstep: bool = False,
         ready: Callable[[], None] = lambda: None,
+        alive: Callable[[], None] = lambda: None,
     ) -> None:
         self._robot = robot
         self._bus = bus
         self._arena = arena
         self._info = Info(robot.profile, LOCKSTEP if lockstep else REALTIME, bus.epoch, msgspec.Raw(arena_info))
         self._ready = ready
+        self._alive = alive
 
     def run(self, stop: threading.Event) -> None:
         """Serve until `stop` is set; sets it if a thread of the server fails, and raises what it failed with.
@@ -102,7 +105,7 @@ class HalServer:
         while not opened.wait(LOOK_S) and not stop.is_set():
             pass
         applied = AppliedLoop(self._robot, self._bus)
-        commands = CommandLoop(self._robot, self._bus, applied)
+        commands = CommandLoop(self._robot, self._bus, applied, self._alive)
         wheels = crew.start("commands", lambda: commands.run(stop))
         crew.start("applied", lambda: applied.run(stop))
         crew.start("pictures", lambda: pictures.run(stop))

@@ -69,20 +69,24 @@ def run(args: argparse.Namespace) -> int:
     from lira.hal.profile import load_profile
     from lira.hal.server.serve import serve
     from lira.robot.ros2.robot import Interface, Ros2Robot
+    from lira.tools.launch.notify import Notifier
     from lira.tools.output.troubles import watch
 
+    notifier = Notifier.from_environment()
     interface = Interface(topics(args.topic), args.cmd_vel == "twist_stamped", math.radians(args.lidar_yaw))
     profile = load_profile(args.profile)
     with closing(Bus(args.name, connect=args.connect, prefix=args.namespace.strip("/"))) as far:
         robot = Ros2Robot(profile, far, interface)
 
         def ready(_: Bus, stop: threading.Event) -> None:
-            print(f"robot '{args.name}' (ROS 2 at {args.connect}) serves on {args.listen}", flush=True)
+            words = f"robot '{args.name}' (ROS 2 at {args.connect}) serves on {args.listen}"
+            print(words, flush=True)
+            notifier.ready(words)
             for warning in warnings(far, stamped=interface.stamped):
                 print(f"warning: {warning}", file=sys.stderr, flush=True)
             watch(robot, stop)
 
-        serve(robot, args.name, args.listen, insecure=args.insecure, ready=ready)
+        serve(robot, args.name, args.listen, insecure=args.insecure, ready=ready, alive=notifier.alive)
     return 0
 
 
