@@ -22,9 +22,9 @@ M = TypeVar("M")
 class Received(Generic[M]):
     """A message as it came. `arrived_s` is when it was polled, on this machine's monotonic clock.
 
-    `key` is the whole key that it came on, `payload` the message as it travelled, `attached` what was attached, whoever's
-    it is. `sender` is the id of the session that put it, "" if that does not stamp what it puts (ours and ROS bridges
-    do).
+    `key` is the whole key that it came on. `payload` is the message as it travelled, `attached` what was attached to
+    it, whoever's it is. `sender` is the id of the session that put it, "" if that does not stamp what it puts (ours and
+    ROS bridges do).
     """
 
     message: M
