@@ -105,7 +105,7 @@ def test_what_is_killed_comes_back_and_nothing_drives_until_a_person_says_so(wor
         assert set(life.twists(WATCH_S)) == {STOP}
         life.until(lambda: "heard" in life.status())
         status = life.status(ok=(0,))
-        assert [process["name"] for process in status["processes"]] == ["twin", "monitor", "driver", "pad"]
+        assert [process["name"] for process in status["processes"]] == ["twin", "monitor", "recorder", "driver", "pad"]
         assert (status["heard"]["situation"], status["heard"]["governor"]) == ("paused", "disarmed")
         # A second `up` says so, and starts nothing.
         assert "already up:" in lira("up", *words)
@@ -125,6 +125,7 @@ def test_what_is_killed_comes_back_and_nothing_drives_until_a_person_says_so(wor
         life.until(lambda: life.twists(0.3))  # heard again
         assert set(life.twists(WATCH_S)) == {STOP}
         assert life.process("driver")["pid"] == driver
+        assert list(Path("recordings").rglob("*.mcap"))
         # The monitor is killed: nobody notices but who asks.
         life.kill("monitor")
         life.until(lambda: "heard" in life.status())

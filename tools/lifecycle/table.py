@@ -86,6 +86,12 @@ PROCESSES: tuple[Process, ...] = (
         "hears rates, ages and who drives, for `lira status`",
         lambda setup: ["-m", "lira.tools.lifecycle.monitor", setup.name, setup.endpoint],
     ),
+    Process(
+        "recorder",
+        "records all that is on the bus",
+        lambda setup: ["record", *_reach(setup)],
+        packages=("mcap",),
+    ),
     Process("learner", "decides, drives and learns", _learner, packages=("torch",)),
     Process("driver", "lets one policy drive", _driver, packages=("safetensors",)),
     Process("page", "shows the robot in a browser, and drives it from there", _page, packages=("aiohttp", "segno")),
@@ -93,8 +99,8 @@ PROCESSES: tuple[Process, ...] = (
 )
 
 SETS: dict[str, tuple[str, ...]] = {
-    "teach": ("twin", "monitor", "learner", "page", "pad"),
-    "drive": ("twin", "monitor", "driver", "page", "pad"),
+    "teach": ("twin", "monitor", "recorder", "learner", "page", "pad"),
+    "drive": ("twin", "monitor", "recorder", "driver", "page", "pad"),
     "look": ("twin", "monitor", "page", "pad"),
 }
 

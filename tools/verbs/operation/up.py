@@ -1,5 +1,6 @@
 """Start all that a robot needs, and keep it running: a twin or, with --robot, the link to a real one, and around it the
-learner, the page in the browser, the gamepad and the monitor. It returns when all of it runs, and the processes stay.
+learner, the recorder, the page in the browser, the gamepad and the monitor. It returns when all of it runs, and the
+processes stay.
 
 Nothing drives by itself: the learner or the driver begins paused, and a person asks it to go on (P on a screen, square
 on the pad). What dies is started again after a pause, and begins paused again. `lira status`, `lira logs` and
