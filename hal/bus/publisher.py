@@ -1,6 +1,7 @@
 """What puts messages on the bus, each with its attachment."""
 
 from collections.abc import Iterator
+from dataclasses import replace
 from typing import Any, Generic, TypeVar
 
 import zenoh
@@ -9,17 +10,34 @@ from zenoh import ext
 from lira.hal.bus.attachment import Attachment
 from lira.hal.bus.connection import Connection
 from lira.hal.bus.topics import Qos, Topic
+from lira.hal.clock import TimeBase
 from lira.hal.errors import BusError
 from lira.hal.messages.codec import encode
 
 M = TypeVar("M")
 
 
+def shifted(message: Any, offset_s: float) -> Any:
+    """Return a message with its stamp, if it has one, moved by so much."""
+    stamp_s = getattr(message, "stamp_s", None) if offset_s else None
+    return message if stamp_s is None else replace(message, stamp_s=stamp_s + offset_s)
+
+
 class Publisher(Generic[M]):
-    """Publishes a topic on one key; what it sends is of the session `epoch`, and counted by `count`."""
+    """Publishes a topic on one key; what it sends is of the session `epoch`, and counted by `count`.
+
+    Times are told by the session's `base`.
+    """
 
     def __init__(
-        self, connection: Connection, key: str, topic: Topic[M], qos: Qos, epoch: int, count: Iterator[int]
+        self,
+        connection: Connection,
+        key: str,
+        topic: Topic[M],
+        qos: Qos,
+        epoch: int,
+        count: Iterator[int],
+        base: TimeBase,
     ) -> None:
         self._connection = connection
         self._key = key
@@ -27,6 +45,7 @@ class Publisher(Generic[M]):
         self._encoding = zenoh.Encoding.APPLICATION_CDR.with_schema(topic.ros_type)
         self._epoch = epoch
         self._count = count
+        self._base = base
         self._kept: tuple[bytes, bytes] | None = None
         self._publisher = connection.declare(self._anew)
 
@@ -42,9 +61,10 @@ class Publisher(Generic[M]):
 
         Raises `BusError` when the session is closed, `CodecError` for what ROS cannot hold.
         """
-        payload = encode(message)
+        payload = encode(shifted(message, self._base.offset_s))
         number = next(self._count) if seq is None else seq
-        attachment = Attachment(self._epoch, number, round(time_s * 1e9), answers, released).to_bytes()
+        time_ns = round(time_s * 1e9) + self._base.offset_ns
+        attachment = Attachment(self._epoch, number, time_ns, answers, released).to_bytes()
         if self._qos.latched:
             self._kept = payload, attachment
         try:

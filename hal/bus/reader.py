@@ -1,7 +1,7 @@
 """What hears a topic: polled, so that no topic can stall another."""
 
 import time
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any, Generic, TypeVar
 
@@ -12,7 +12,9 @@ from zenoh.handlers import RingChannel
 from lira.hal.bus.attachment import Attachment, parse_attachment
 from lira.hal.bus.boundary import Boundary
 from lira.hal.bus.connection import Connection, Declared
+from lira.hal.bus.publisher import shifted
 from lira.hal.bus.topics import ATTACHMENT_BYTES, BY, Topic
+from lira.hal.clock import TimeBase
 from lira.hal.messages.codec import decode
 
 M = TypeVar("M")
@@ -39,12 +41,18 @@ class Received(Generic[M]):
 
 
 class Reader(Generic[M]):
-    """Keeps the newest `depth` of a topic. What is too long or cannot be decoded is refused at the bus's `boundary`."""
+    """Keeps the newest `depth` of a topic. What is too long or cannot be decoded is refused at the bus's `boundary`.
 
-    def __init__(self, connection: Connection, key: str, topic: Topic[M], depth: int, boundary: Boundary) -> None:
+    Times come as the session counts them itself, by its `base`.
+    """
+
+    def __init__(
+        self, connection: Connection, key: str, topic: Topic[M], depth: int, boundary: Boundary, base: TimeBase
+    ) -> None:
         self._connection = connection
         self._topic = topic
         self._boundary = boundary
+        self._base = base
         self._newest: Received[M] | None = None
         self._depth = depth
         self.full = False  # the last poll took all that is kept, so older messages may have been lost
@@ -75,8 +83,10 @@ class Reader(Generic[M]):
         if len(sample.payload) > self._topic.max_bytes or (attached is not None and len(attached) > ATTACHMENT_BYTES):
             self._boundary.refuse(self._topic.key, "too long")
             return None
-        message = decode(self._topic.kind, bytes(sample.payload))
+        message = shifted(decode(self._topic.kind, bytes(sample.payload)), -self._base.offset_s)
         sent = parse_attachment(None if attached is None else bytes(attached))
+        if sent is not None and self._base.offset_s:
+            sent = replace(sent, time_ns=sent.time_ns - self._base.offset_ns)
         return Received(message, sent, time.monotonic(), str(sample.key_expr), self._sender(sample))
 
     def newest(self) -> Received[M] | None:
