@@ -1,13 +1,16 @@
 """What puts messages on the bus, each with its attachment."""
 
+<<<<<<< HEAD
 from collections.abc import Iterator
 from dataclasses import replace
 from typing import Any, Generic, TypeVar
+=======
+from typing import Any, Generic, Protocol, TypeVar
+>>>>>>> origin/main
 
 import zenoh
 from zenoh import ext
 
-from lira.hal.bus.attachment import Attachment
 from lira.hal.bus.connection import Connection
 from lira.hal.bus.topics import Qos, Topic
 from lira.hal.clock import TimeBase
@@ -17,6 +20,7 @@ from lira.hal.messages.codec import encode
 M = TypeVar("M")
 
 
+<<<<<<< HEAD
 def shifted(message: Any, offset_s: float) -> Any:
     """Return a message with its stamp, if it has one, moved by so much."""
     stamp_s = getattr(message, "stamp_s", None) if offset_s else None
@@ -39,13 +43,30 @@ class Publisher(Generic[M]):
         count: Iterator[int],
         base: TimeBase,
     ) -> None:
+=======
+class Attach(Protocol):
+    """What makes the attachment of a message; the arguments are those of `Publisher.put`."""
+
+    def __call__(self, time_s: float, seq: int | None, answers: int, *, released: bool) -> bytes:
+        """Return it."""
+
+
+class Publisher(Generic[M]):
+    """Publishes a topic on one key, each message with what `attach` makes."""
+
+    def __init__(self, connection: Connection, key: str, topic: Topic[M], qos: Qos, attach: Attach) -> None:
+>>>>>>> origin/main
         self._connection = connection
         self._key = key
         self._qos = qos
         self._encoding = zenoh.Encoding.APPLICATION_CDR.with_schema(topic.ros_type)
+<<<<<<< HEAD
         self._epoch = epoch
         self._count = count
         self._base = base
+=======
+        self._attach = attach
+>>>>>>> origin/main
         self._kept: tuple[bytes, bytes] | None = None
         self._publisher = connection.declare(self._anew)
 
@@ -61,10 +82,15 @@ class Publisher(Generic[M]):
 
         Raises `BusError` when the session is closed, `CodecError` for what ROS cannot hold.
         """
+<<<<<<< HEAD
         payload = encode(shifted(message, self._base.offset_s))
         number = next(self._count) if seq is None else seq
         time_ns = round(time_s * 1e9) + self._base.offset_ns
         attachment = Attachment(self._epoch, number, time_ns, answers, released).to_bytes()
+=======
+        payload = encode(message)
+        attachment = self._attach(time_s, seq, answers, released=released)
+>>>>>>> origin/main
         if self._qos.latched:
             self._kept = payload, attachment
         try:
