@@ -48,6 +48,9 @@ class TimeBase:
         return round(self.offset_s * 1e9)
 
 
+OWN_TIME = TimeBase()
+
+
 class ClockEstimate:
     """Pure: every time comes in as an argument, `local_s` on this machine's monotonic clock.
 

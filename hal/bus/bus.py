@@ -7,12 +7,8 @@ import itertools
 import secrets
 import time
 from collections import Counter
-<<<<<<< HEAD
 from collections.abc import Callable, Iterator
-=======
-from collections.abc import Iterator
 from functools import partial
->>>>>>> origin/main
 from typing import Any, TypeVar
 
 import zenoh
@@ -117,13 +113,8 @@ class Bus:
     def publisher(self, topic: Topic[M], qos: Qos | None = None) -> Publisher[M]:
         """Declare a publisher; `qos` replaces the table's."""
         key = self._key(self._own(topic).key)
-<<<<<<< HEAD
-        count = self._counts.setdefault(key, itertools.count(1))
-        return Publisher(self._connection, key, topic, qos or topic.qos, self.epoch, count, self._time_base)
-=======
-        attach = partial(_attach, self.epoch, self._counts.setdefault(key, itertools.count(1)))
-        return Publisher(self._connection, key, topic, qos or topic.qos, attach)
->>>>>>> origin/main
+        attach = partial(_attach, self.epoch, self._counts.setdefault(key, itertools.count(1)), self._time_base)
+        return Publisher(self._connection, key, topic, qos or topic.qos, attach, self._time_base)
 
     def put_raw(self, topic: Topic[Any], payload: bytes, attachment: bytes | None = None) -> None:
         """Send bytes as they are: for relays, recorders and tests of what a bus has to bear."""
@@ -218,6 +209,15 @@ class Bus:
         return f"{self._prefix}/{key}" if self._prefix else key
 
 
-def _attach(epoch: int, count: Iterator[int], time_s: float, seq: int | None, answers: int, *, released: bool) -> bytes:
+def _attach(
+    epoch: int,
+    count: Iterator[int],
+    base: TimeBase,
+    time_s: float,
+    seq: int | None,
+    answers: int,
+    *,
+    released: bool,
+) -> bytes:
     number = next(count) if seq is None else seq
-    return Attachment(epoch, number, round(time_s * 1e9), answers, released).to_bytes()
+    return Attachment(epoch, number, round(time_s * 1e9) + base.offset_ns, answers, released).to_bytes()

@@ -1,49 +1,26 @@
 """What puts messages on the bus, each with its attachment."""
 
-<<<<<<< HEAD
-from collections.abc import Iterator
 from dataclasses import replace
-from typing import Any, Generic, TypeVar
-=======
 from typing import Any, Generic, Protocol, TypeVar
->>>>>>> origin/main
 
 import zenoh
 from zenoh import ext
 
 from lira.hal.bus.connection import Connection
 from lira.hal.bus.topics import Qos, Topic
-from lira.hal.clock import TimeBase
+from lira.hal.clock import OWN_TIME, TimeBase
 from lira.hal.errors import BusError
 from lira.hal.messages.codec import encode
 
 M = TypeVar("M")
 
 
-<<<<<<< HEAD
 def shifted(message: Any, offset_s: float) -> Any:
     """Return a message with its stamp, if it has one, moved by so much."""
     stamp_s = getattr(message, "stamp_s", None) if offset_s else None
     return message if stamp_s is None else replace(message, stamp_s=stamp_s + offset_s)
 
 
-class Publisher(Generic[M]):
-    """Publishes a topic on one key; what it sends is of the session `epoch`, and counted by `count`.
-
-    Times are told by the session's `base`.
-    """
-
-    def __init__(
-        self,
-        connection: Connection,
-        key: str,
-        topic: Topic[M],
-        qos: Qos,
-        epoch: int,
-        count: Iterator[int],
-        base: TimeBase,
-    ) -> None:
-=======
 class Attach(Protocol):
     """What makes the attachment of a message; the arguments are those of `Publisher.put`."""
 
@@ -52,21 +29,17 @@ class Attach(Protocol):
 
 
 class Publisher(Generic[M]):
-    """Publishes a topic on one key, each message with what `attach` makes."""
+    """Publishes a topic on one key, each message with what `attach` makes, its stamp told by the session's `base`."""
 
-    def __init__(self, connection: Connection, key: str, topic: Topic[M], qos: Qos, attach: Attach) -> None:
->>>>>>> origin/main
+    def __init__(
+        self, connection: Connection, key: str, topic: Topic[M], qos: Qos, attach: Attach, base: TimeBase = OWN_TIME
+    ) -> None:
         self._connection = connection
         self._key = key
         self._qos = qos
         self._encoding = zenoh.Encoding.APPLICATION_CDR.with_schema(topic.ros_type)
-<<<<<<< HEAD
-        self._epoch = epoch
-        self._count = count
-        self._base = base
-=======
         self._attach = attach
->>>>>>> origin/main
+        self._base = base
         self._kept: tuple[bytes, bytes] | None = None
         self._publisher = connection.declare(self._anew)
 
@@ -82,15 +55,8 @@ class Publisher(Generic[M]):
 
         Raises `BusError` when the session is closed, `CodecError` for what ROS cannot hold.
         """
-<<<<<<< HEAD
         payload = encode(shifted(message, self._base.offset_s))
-        number = next(self._count) if seq is None else seq
-        time_ns = round(time_s * 1e9) + self._base.offset_ns
-        attachment = Attachment(self._epoch, number, time_ns, answers, released).to_bytes()
-=======
-        payload = encode(message)
         attachment = self._attach(time_s, seq, answers, released=released)
->>>>>>> origin/main
         if self._qos.latched:
             self._kept = payload, attachment
         try:

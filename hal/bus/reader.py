@@ -14,7 +14,7 @@ from lira.hal.bus.boundary import Boundary
 from lira.hal.bus.connection import Connection, Declared
 from lira.hal.bus.publisher import shifted
 from lira.hal.bus.topics import ATTACHMENT_BYTES, BY, Topic
-from lira.hal.clock import TimeBase
+from lira.hal.clock import OWN_TIME, TimeBase
 from lira.hal.messages.codec import decode
 
 M = TypeVar("M")
@@ -24,9 +24,9 @@ M = TypeVar("M")
 class Received(Generic[M]):
     """A message as it came. `arrived_s` is when it was polled, on this machine's monotonic clock.
 
-    `key` is the whole key that it came on, `payload` the message as it travelled, `attached` what was attached, whoever's
-    it is. `sender` is the id of the session that put it, "" if that does not stamp what it puts (ours and ROS bridges
-    do).
+    `key` is the whole key that it came on, `payload` the message as it travelled, `attached` what was attached,
+    whoever's it is. `sender` is the id of the session that put it, "" if that does not stamp what it puts (ours and ROS
+    bridges do).
     """
 
     message: M
@@ -50,7 +50,13 @@ class Reader(Generic[M]):
     """
 
     def __init__(
-        self, connection: Connection, key: str, topic: Topic[M], depth: int, boundary: Boundary, base: TimeBase
+        self,
+        connection: Connection,
+        key: str,
+        topic: Topic[M],
+        depth: int,
+        boundary: Boundary,
+        base: TimeBase = OWN_TIME,
     ) -> None:
         self._connection = connection
         self._topic = topic
@@ -86,17 +92,12 @@ class Reader(Generic[M]):
         if len(sample.payload) > self._topic.max_bytes or (attached is not None and len(attached) > ATTACHMENT_BYTES):
             self._boundary.refuse(self._topic.key, "too long")
             return None
-<<<<<<< HEAD
-        message = shifted(decode(self._topic.kind, bytes(sample.payload)), -self._base.offset_s)
-        sent = parse_attachment(None if attached is None else bytes(attached))
-        if sent is not None and self._base.offset_s:
-            sent = replace(sent, time_ns=sent.time_ns - self._base.offset_ns)
-        return Received(message, sent, time.monotonic(), str(sample.key_expr), self._sender(sample))
-=======
         payload, beside = bytes(sample.payload), None if attached is None else bytes(attached)
         message, sent, arrived_s = decode(self._topic.kind, payload), parse_attachment(beside), time.monotonic()
+        if self._base.offset_s:
+            message = shifted(message, -self._base.offset_s)
+            sent = None if sent is None else replace(sent, time_ns=sent.time_ns - self._base.offset_ns)
         return Received(message, sent, arrived_s, str(sample.key_expr), self._sender(sample), payload, beside)
->>>>>>> origin/main
 
     def newest(self) -> Received[M] | None:
         """Return the newest message that ever came, however old it is."""
