@@ -1,8 +1,12 @@
 """The robot as ROS sees it: a tree of frames as tf2 takes it, a model, what the camera projects, honest covariances."""
 
 import math
+import re
+import subprocess
+import sys
 import time
 import xml.etree.ElementTree as ET
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -95,6 +99,19 @@ def test_the_urdf_has_the_frames_of_tf_where_tf_has_them(name):
         assert joint.find("child").get("link") == transform.child
         numbers = [float(word) for word in joint.find("origin").get("xyz").split()]
         assert numbers == pytest.approx(transform.translation, abs=1e-6)
+
+
+@pytest.mark.parametrize("name", known_profiles())
+def test_the_urdf_parser_of_ros_takes_the_model(name, tmp_path):
+    path = tmp_path / "robot.urdf"
+    path.write_text(urdf_of(load_profile(name)))
+    check = [Path(sys.executable).parent / "check_urdf", path]
+    done = subprocess.run(check, check=False, capture_output=True, text=True, timeout=60)
+    assert done.returncode == 0, done.stdout + done.stderr
+    assert "Successfully Parsed XML" in done.stdout
+    assert "root Link: base_link" in done.stdout
+    for frame in ("base_footprint", "laser", "camera_link", "camera_optical_frame"):
+        assert re.search(rf"child\(\d\):  {frame}\n", done.stdout)
 
 
 def test_the_pinhole_projects_the_edge_of_view_to_the_edge_of_the_picture():
