@@ -22,7 +22,7 @@ from lira.hal.bus.expiry import Reminder
 from lira.hal.bus.keys import Keys, keys_from_environment, load_keys
 from lira.hal.bus.publisher import Publisher
 from lira.hal.bus.questions import Answer, Questions, ask_once
-from lira.hal.bus.reader import Reader
+from lira.hal.bus.reader import Reader, Tap
 from lira.hal.bus.topics import COMMANDS, Qos, Topic, named
 from lira.hal.bus.zenoh_session import open_session
 from lira.hal.errors import BusError, ConfigError
@@ -118,6 +118,10 @@ class Bus:
     def reader(self, topic: Topic[M], depth: int = 1) -> Reader[M]:
         """Declare a reader that keeps the newest `depth` messages between polls."""
         return Reader(self._connection, self._key(topic.key), topic, depth, self.boundary)
+
+    def tap(self) -> Tap:
+        """Hear everything that this session may hear, as it came."""
+        return Tap(self._connection, self._prefix, self.boundary)
 
     def questions(self, key: str) -> Questions:
         """Answer queries on a key."""
