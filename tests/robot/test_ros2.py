@@ -150,7 +150,7 @@ def test_where_no_bridge_is_that_is_said(monkeypatch):
 @pytest.mark.parametrize("datagrams", [False, True])
 def test_the_verb_serves_it_for_lira_fusion_and_says_what_is_missing(tmp_path, datagrams):
     far_port, near_port = free_port(), free_port()
-    robot = Peer(far_port, datagrams=datagrams)
+    robot = Peer(far_port, datagrams=datagrams, command="TwistStamped" if datagrams else "Twist")
     name, near = f"verb_{near_port}", f"127.0.0.1:{near_port}"
     words = ["ros2", "--connect", f"127.0.0.1:{far_port}", "--name", name, "--listen", near, "--profile", "thesis-sim"]
     words += ["--lidar-yaw", "180", *(["--cmd-vel", "twist_stamped"] if datagrams else [])]
