@@ -135,3 +135,8 @@ def add_protocol(parser: argparse.ArgumentParser, layouts: str | None = None, pr
         help="what ends the teaching: the novice alone passes the lap it was just taught on (own), K layouts in a row "
         f"that it has never seen (fresh:K), or K of N (fresh:K/N; default: {usual})",
     )
+
+
+def add_ros_domain(parser: argparse.ArgumentParser, what: str) -> None:
+    """Declare `--domain`."""
+    parser.add_argument("--domain", type=natural, default=0, metavar="N", help=f"{what} {DEFAULT}")
