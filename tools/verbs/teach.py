@@ -7,7 +7,7 @@ the pad. On a real robot you judge: passed, failed, or take over. U takes the la
 
 examples:
   lira teach --as ada                                  on a twin; then, in another shell: lira web
-  lira teach --as ada --speed 0.7                      slower than real time, for the first time
+  lira teach --as ada --speed 0.5                      slower than real time, for the first time
   lira teach --as ada --run runs/teach-ada             go on another day: labels and counts go on
   lira teach --connect 192.168.1.20:7447 --as ada      a robot that is there
   lira teach --world line-obstacles --person scripted  a script drives by teleop as a hand would, at 2.5 times real time
@@ -33,8 +33,7 @@ if TYPE_CHECKING:
     from lira.tools.runs.teach import Plan
 
 SCRIPT_SPEED = 2.5
-# Slower, a client's estimate of the twin's clock runs so far ahead of it that commands would be refused.
-SLOWEST, FASTEST = 0.7, 5.0
+SLOWEST, FASTEST = 0.4, 5.0  # of a person's; slower, a screen would take what the twin says for old
 READY_S = 90.0
 NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_-]{0,31}")
 
