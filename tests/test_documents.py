@@ -11,8 +11,8 @@ from pathlib import Path
 import pytest
 
 import lira
-from lira.tools.cli import VERBS
 from lira.tools.stop_test.rows import ROWS
+from lira.tools.verbs import VERBS
 
 ROOT = Path(__file__).parent.parent
 DOCS = ROOT / "docs"

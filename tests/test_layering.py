@@ -47,8 +47,8 @@ ROOMS = {
     },
 }
 MOST_MODULES = 16  # in one folder
-# A verb is a module, and an experiment's parts are many; the rest waits for a better order.
-MORE_MODULES = {"tools/verbs": 26, "tools/experiments": 18, "tools/joystick": 20}
+# An experiment's parts are many; the rest waits for a better order.
+MORE_MODULES = {"tools/experiments": 18, "tools/joystick": 20}
 NOT_ON_THE_ROBOT = {"torch", "pybullet", "pygame", "safetensors", "matplotlib"}
 
 

@@ -1,60 +1,20 @@
-"""The `lira` command: one table of verbs, each a module that is imported when its verb is used."""
+"""The `lira` command: finds the verb, runs it, and tells in two lines what went wrong."""
 
 import argparse
 import difflib
 import importlib
 import signal
 import sys
-from typing import TYPE_CHECKING, NamedTuple, NoReturn, Protocol, cast
+from typing import TYPE_CHECKING, NoReturn, Protocol, cast
 
 from lira.hal.errors import ConfigError, LiraError, MissingExtraError
 from lira.hal.plugins import blame
 from lira.tools.launch import lifetime
+from lira.tools.verbs import GROUPS, VERBS, Verb
 
 if TYPE_CHECKING:
     from _typeshed import SupportsWrite
 
-
-class Verb(NamedTuple):
-    """A line of `lira --help`."""
-
-    module: str
-    help: str
-
-
-VERBS = {
-    "demo": Verb("lira.tools.verbs.demo", "teach a robot in the digital twin, from start to report, in minutes"),
-    "teach": Verb("lira.tools.verbs.teach", "teach a robot yourself, from practice to a verdict"),
-    "twin": Verb("lira.tools.verbs.twin", "the digital twin: a simulated ROSbot on the bus"),
-    "robot": Verb(
-        "lira.tools.verbs.robot", "the physical ROSbot: opens its lidar, camera and base, and puts it on the bus"
-    ),
-    "ros2": Verb("lira.tools.verbs.ros2", "a robot that runs ROS 2: puts it on the bus through zenoh-bridge-ros2dds"),
-    "calibrate": Verb(
-        "lira.tools.verbs.calibrate", "measure how far the base really goes, and write it into its settings"
-    ),
-    "fusion": Verb(
-        "lira.tools.verbs.fusion", "the learner: reads sensors, decides, drives, trains (LIRA-SPF, HG-DAgger)"
-    ),
-    "drive": Verb("lira.tools.verbs.drive", "let a novice or an expert drive, also on the robot itself"),
-    "train-expert": Verb("lira.tools.verbs.train_expert", "train the camera or the lidar expert"),
-    "experiment": Verb("lira.tools.verbs.experiment", "repeat an experiment of the thesis, with statistics"),
-    "new": Verb("lira.tools.verbs.new", "begin an expert, a method, a robot, a sensor or a world of your own"),
-    "joystick": Verb("lira.tools.verbs.joystick", "drive by hand: a gamepad on this machine, straight to the robot"),
-    "console": Verb("lira.tools.verbs.console", "watch the robot learn on a screen"),
-    "web": Verb("lira.tools.verbs.web", "watch, teach and drive the robot from a page in the browser"),
-    "report": Verb("lira.tools.verbs.report", "make the HTML page of a recorded run"),
-    "study": Verb("lira.tools.verbs.study", "a study with people: orders, blocks, questions, table, analysis"),
-    "labels": Verb("lira.tools.verbs.labels", "look through a log of labels for damage, and repair it"),
-    "keys": Verb("lira.tools.verbs.keys", "make the keys that say who may drive a robot, and encrypt the bus"),
-    "stop-test": Verb(
-        "lira.tools.verbs.stop_test", "break things while a robot drives, and measure how soon it stands"
-    ),
-    "parity": Verb("lira.tools.verbs.parity", "the same motions on two robots, and where they differ"),
-    "doctor": Verb("lira.tools.verbs.doctor", "what is wrong with this machine and its devices, and the remedy"),
-    "world": Verb("lira.tools.verbs.world", "draw a world from above and as the camera sees it"),
-    "bench": Verb("lira.tools.verbs.bench", "measure speed on this machine"),
-}
 
 # Packages that only a part of the installation has, and the extra that brings them.
 EXTRAS = {
@@ -78,7 +38,7 @@ EXIT_BROKEN_PIPE = EXIT_SIGNAL + signal.SIGPIPE
 
 
 class VerbModule(Protocol):
-    """What a module in tools/verbs offers."""
+    """What a verb's module offers."""
 
     __doc__: str | None
 
@@ -184,13 +144,14 @@ def find_verb(name: str) -> Verb:
 def overview() -> str:
     """Text of `lira --help`."""
     width = max(map(len, VERBS))
-    lines = [f"  {name:<{width}}  {verb.help}" for name, verb in VERBS.items()]
+    lines = []
+    for (_, title), verbs in GROUPS.items():
+        lines += ["", f"{title}:", *(f"  {name:<{width}}  {help_}" for name, help_ in verbs.items())]
     return "\n".join(
         [
             "usage: lira VERB [arguments]",
             "",
             "Teach a ROSbot by interaction: single-sensor experts and a person train a fused policy (LIRA-SPF).",
-            "",
             *lines,
             "",
             "`lira VERB --help` explains a verb; `lira --version` names the version. Start with `lira demo`.",

@@ -152,7 +152,7 @@ class Blocked:
             raise AssertionError(f"{name} is imported")
 
 sys.meta_path.insert(0, Blocked())
-import lira.tools.runs.alone, lira.tools.verbs.drive
+import lira.tools.runs.alone, lira.tools.verbs.learn.drive
 from lira.fusion.experts.load import load_alone
 from lira.hal.profile import load_profile
 import numpy as np, lira

@@ -22,7 +22,7 @@ from lira.sim_backend.emulators.wire import Wire
 from lira.tools.calibration import CalibrationError, Way
 from lira.tools.cli import EXIT_SIGNAL, main
 from lira.tools.launch.processes import ChildProcess, lira_command
-from lira.tools.verbs import calibrate
+from lira.tools.verbs.robots import calibrate
 
 WALLS_M = (3.0, 1.7, -1.0, -1.3)  # ahead, left, behind, right of where it starts
 NO_FIELD = ["--profile", "thesis-sim"]  # whose robot may be driven without a lidar

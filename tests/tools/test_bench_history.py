@@ -4,7 +4,7 @@ import pytest
 
 from lira.hal.errors import ConfigError
 from lira.tools.output import bench_history as history
-from lira.tools.verbs import bench
+from lira.tools.verbs.checks import bench
 
 ROWS = [
     {"profile": "thesis-sim", "real_time_factor": 60.0, "ratio_to_bare": 1.2, "p50_ms": 3.0},

@@ -6,6 +6,7 @@ import pytest
 
 from lira.hal.errors import ConfigError
 from lira.tools import cli
+from lira.tools.verbs import VERBS, Verb
 
 
 def lira(*words, block=()):
@@ -34,7 +35,7 @@ def verb(monkeypatch):
 
         module = SimpleNamespace(__doc__="Test.\n\nexample: none\n", add_arguments=add_arguments, run=run)
         monkeypatch.setitem(sys.modules, "verb_for_test", module)
-        monkeypatch.setitem(cli.VERBS, "try", cli.Verb("verb_for_test", "a verb for tests"))
+        monkeypatch.setitem(VERBS, "try", Verb("verb_for_test", "a verb for tests"))
 
     return install
 
@@ -42,10 +43,10 @@ def verb(monkeypatch):
 def test_help_lists_every_verb_and_needs_only_the_standard_library():
     done = lira("--help", block=["numpy", "zenoh", "torch", "pybullet", "msgspec", "cv2", "rosbags"])
     assert done.returncode == 0, done.stderr
-    assert all(name in done.stdout for name in cli.VERBS)
+    assert all(name in done.stdout for name in VERBS)
 
 
-@pytest.mark.parametrize("verb", cli.VERBS)
+@pytest.mark.parametrize("verb", VERBS)
 def test_every_verb_explains_itself(verb, capsys):
     with pytest.raises(SystemExit) as end:
         cli.main([verb, "--help"])

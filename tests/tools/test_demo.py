@@ -15,7 +15,7 @@ from synthetic_run import write_run
 from lira.hal.errors import ConfigError
 from lira.tools.launch.launch import Part
 from lira.tools.launch.processes import ProcessError
-from lira.tools.verbs import demo
+from lira.tools.verbs.teach import demo
 
 HERE = Path(__file__).parent
 TWIN = "import time; print(\"twin 'x' serves world 'line'\", flush=True); time.sleep(60)"
@@ -118,7 +118,7 @@ def test_ending_the_demo_ends_its_processes(tmp_path, number):
 import pathlib, sys
 from lira.tools.launch.launch import Part
 from lira.tools.launch.lifetime import interruptible
-from lira.tools.verbs.demo import supervise
+from lira.tools.verbs.teach.demo import supervise
 command = [sys.executable, "-c", {child!r}]
 parts = [Part("the twin", "twin.log", "serves", lambda _: command)]
 try:

@@ -9,7 +9,7 @@ from short_trials import short_trial, write_world
 
 from lira.tools.cli import main
 from lira.tools.experiments.registry import REGISTRY, load
-from lira.tools.verbs import experiment as verb
+from lira.tools.verbs.learn import experiment as verb
 
 
 @pytest.fixture

@@ -9,7 +9,7 @@ from lira.hal.messages.ros_table import CODECS
 from lira.tools.bench import BENCHES, fuzz
 from lira.tools.bench.soak import Watched, Work, growth, rise
 from lira.tools.cli import main
-from lira.tools.verbs.bench import exit_status
+from lira.tools.verbs.checks.bench import exit_status
 
 
 def test_garbage_ends_in_a_value_or_in_the_decoders_own_error():

@@ -10,7 +10,7 @@ import pytest
 from lira.hal import plugins
 from lira.hal.plugins import Door
 from lira.tools.cli import main
-from lira.tools.verbs.new import KINDS
+from lira.tools.verbs.teach.new import KINDS
 
 
 @pytest.fixture

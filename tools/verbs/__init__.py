@@ -1,4 +1,66 @@
-"""One module per verb of `lira`, each with `add_arguments(parser)` and `run(args) -> exit status`.
+"""The verbs of `lira`, by what they are for: one table, and a module a verb.
 
-The module's docstring is the verb's help: first what it does, then examples. Heavy imports belong inside `run`.
+A verb's module has `add_arguments(parser)` and `run(args) -> exit status`. Its docstring is the verb's help: first what
+it does, then examples. Heavy imports belong inside `run`.
 """
+
+from typing import NamedTuple
+
+
+class Verb(NamedTuple):
+    """A line of `lira --help`."""
+
+    module: str
+    help: str
+
+
+# Title of a group in the help, and its verbs; a group's folder is named beside its title.
+GROUPS = {
+    ("teach", "Teach"): {
+        "demo": "teach a robot in the digital twin, from start to report, in minutes",
+        "teach": "teach a robot yourself, from practice to a verdict",
+        "study": "a study with people: orders, blocks, questions, table, analysis",
+        "new": "begin an expert, a method, a robot, a sensor or a world of your own",
+    },
+    ("robots", "Robots"): {
+        "twin": "the digital twin: a simulated ROSbot on the bus",
+        "robot": "the physical ROSbot: opens its lidar, camera and base, and puts it on the bus",
+        "ros2": "a robot that runs ROS 2: puts it on the bus through zenoh-bridge-ros2dds",
+        "calibrate": "measure how far the base really goes, and write it into its settings",
+        "parity": "the same motions on two robots, and where they differ",
+    },
+    ("learn", "Learn"): {
+        "fusion": "the learner: reads sensors, decides, drives, trains (LIRA-SPF, HG-DAgger)",
+        "drive": "let a novice or an expert drive, also on the robot itself",
+        "train-expert": "train the camera or the lidar expert",
+        "experiment": "repeat an experiment of the thesis, with statistics",
+        "labels": "look through a log of labels for damage, and repair it",
+    },
+    ("screens", "Hand and eye"): {
+        "joystick": "drive by hand: a gamepad on this machine, straight to the robot",
+        "console": "watch the robot learn on a screen",
+        "web": "watch, teach and drive the robot from a page in the browser",
+        "world": "draw a world from above and as the camera sees it",
+    },
+    ("records", "Records"): {
+        "report": "make the HTML page of a recorded run",
+    },
+    ("operation", "Operation"): {
+        "keys": "make the keys that say who may drive a robot, and encrypt the bus",
+    },
+    ("checks", "Checks"): {
+        "doctor": "what is wrong with this machine and its devices, and the remedy",
+        "stop-test": "break things while a robot drives, and measure how soon it stands",
+        "bench": "measure speed on this machine",
+    },
+}
+
+
+def module_of(folder: str, verb: str) -> str:
+    """Return the full name of a verb's module."""
+    return f"{__name__}.{folder}.{verb.replace('-', '_')}"
+
+
+VERBS = {
+    name: Verb(module_of(folder, name), help_) for (folder, _), verbs in GROUPS.items() for name, help_ in verbs.items()
+}

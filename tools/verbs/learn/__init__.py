@@ -1,0 +1,1 @@
+"""Verbs that learn, drive with what was learned, and experiment."""

@@ -1,0 +1,1 @@
+"""Verbs that set a robot up and keep it running."""

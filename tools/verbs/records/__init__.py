@@ -1,0 +1,1 @@
+"""Verbs that keep what happened and look through it."""

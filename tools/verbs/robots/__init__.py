@@ -1,0 +1,1 @@
+"""Verbs that put a robot on the bus, and compare and measure robots."""

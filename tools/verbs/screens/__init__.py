@@ -1,0 +1,1 @@
+"""Verbs for the person beside the robot: hand, eyes and ears."""

@@ -1,0 +1,1 @@
+"""Verbs that teach a robot, from the demo to a study."""
