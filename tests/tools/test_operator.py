@@ -74,6 +74,7 @@ CASES = [
     (in_session("practice", applied=BY_HAND), "practice"),
     (in_session("ready"), "ready"),
     (in_session("proving"), "proving"),
+    (in_session("exam"), "exam"),
     (in_session("judging"), "judging"),
     (in_session("judging", held(Reason.STALE)), "stale"),
     (in_session("verdict"), "verdict"),
@@ -131,7 +132,7 @@ def test_every_reason_of_the_governor_has_a_situation():
 def test_every_language_has_words_for_every_situation(language):
     words = vocabulary(language)
     assert set(words) == set(Situation)
-    known = {"expert", "age", "lost", "verdict"}
+    known = {"expert", "age", "lost", "verdict", "proven", "shown"}
     for said in words.values():
         for line in (said.who, said.why, said.now):
             assert line

@@ -8,6 +8,7 @@ from lira.fusion.log.counts import Ledger
 from lira.fusion.log.run_log import LapRecord
 from lira.fusion.teaching.session import Tally
 from lira.hal.messages import SessionState, Stage
+from lira.tools.live.before import Before
 from lira.tools.runs.progress import Say
 
 REPORT_S = 0.5
@@ -15,12 +16,27 @@ CURVE = 100  # laps
 
 
 class Board:
-    """The newest `state` of a session. `now` is the robot's clock."""
+    """The newest `state` of a session, which goes on from the days `before`. `now` is the robot's clock."""
 
     def __init__(
-        self, person: str, ledger: Ledger, now: Callable[[], float], publish: Callable[[SessionState], None], say: Say
+        self,
+        person: str,
+        before: Before,
+        ledger: Ledger,
+        now: Callable[[], float],
+        publish: Callable[[SessionState], None],
+        say: Say,
     ) -> None:
-        self.state = SessionState(now(), Stage.PRACTICE, person)
+        self.state = SessionState(
+            now(),
+            Stage.PRACTICE,
+            person,
+            laps=before.laps,
+            passed=before.passed,
+            collisions=before.collisions,
+            lost=before.lost,
+            curve=before.curve[-CURVE:],
+        )
         self._ledger, self._now, self._publish, self._say = ledger, now, publish, say
         self._shown_s = float("-inf")
 

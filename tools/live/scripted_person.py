@@ -90,7 +90,7 @@ class Person:
             self._teacher.reset(session.layout)
         if session.stage is Stage.VERDICT:
             return STAND  # a hand on the controls goes on
-        if state.collided or state.lost or state.finished or session.stage in (Stage.PROVING, Stage.OVER):
+        if state.collided or state.lost or state.finished or session.stage in (Stage.PROVING, Stage.EXAM, Stage.OVER):
             return None
         if session.stage in (Stage.PRACTICE, Stage.READY) or decision is None:
             return self._teach(state, None)

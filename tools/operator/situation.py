@@ -9,7 +9,7 @@ The first of these rules that holds decides: who must act comes before who drive
 | the dead-man is held | person; slowly: person_slow; paused: person_paused |
 | a request paused it | paused |
 | a session is at a stage that is the person's | practice, ready, judging, verdict |
-| a session proves on a twin | proving |
+| a session proves on a twin | proving, exam |
 | a twin's lap is over | collided, strayed, finished |
 | the governor lets nothing through | its reason |
 | the policy stands and waits for a person | waits, unknown |
@@ -58,6 +58,7 @@ class Situation(StrEnum):
     SHIELD = "shield"
     SHIELD_STANDS = "shield_stands"
     PROVING = "proving"
+    EXAM = "exam"
     NOVICE = "novice"
     MEAN = "mean"
     EXPERT = "expert"
@@ -106,6 +107,7 @@ STAGES: dict[Stage, Situation] = {
     Stage.READY: _S.READY,
     Stage.JUDGING: _S.JUDGING,
     Stage.PROVING: _S.PROVING,
+    Stage.EXAM: _S.EXAM,
     Stage.VERDICT: _S.VERDICT,
 }
 

@@ -67,7 +67,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add("--speed", type=_speed, help="of the twin, times real time (default: 1; with a scripted person 2.5)")
     add("--method", default="plus", help=f"way of teaching, as in `lira fusion` {DEFAULT}")
     add("--practice", type=float, metavar="S", help="seconds of driving before it counts (default: 15, scripted: 2)")
-    add("--unseen", type=natural, default=3, help=f"layouts that the novice has not seen, to prove itself {DEFAULT}")
+    add("--unseen", type=natural, default=12, help=f"layouts that the novice has not seen, to prove itself {DEFAULT}")
     add("--laps", type=natural, default=100, help=f"end after so many laps of teaching {DEFAULT}")
     add("--minutes", type=float, metavar="M", help="end after so many minutes of teaching (default: when you end it)")
     add("--whole-time", action="store_true", help="with --minutes: go on though the novice has passed")
@@ -92,7 +92,7 @@ def run(args: argparse.Namespace) -> int:
     from lira.fusion.inference.threads import one_thread
     from lira.hal.client.remote import connect
     from lira.tools.launch.lifetime import CLOSE_S
-    from lira.tools.live.session import Rules
+    from lira.tools.live.rules import Rules
     from lira.tools.live.sitting import sit
     from lira.tools.runs.reach import say
 
@@ -103,9 +103,7 @@ def run(args: argparse.Namespace) -> int:
     one_thread()
     args.speed = args.speed or (SCRIPT_SPEED if scripted else 1.0)
     practice_s = args.practice if args.practice is not None else 2.0 if scripted else 15.0
-    rules = Rules(
-        practice_s=practice_s, person=args.who, laps=args.laps, minutes=args.minutes, whole_time=args.whole_time
-    )
+    rules = Rules(practice_s, args.who, args.laps, args.minutes, args.whole_time, args.unseen)
     with contextlib.ExitStack() as stack:
         stack.enter_context(robot_of(args))
         robot = stack.enter_context(connect(args.connect, args.name, close_s=CLOSE_S))
