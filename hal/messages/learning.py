@@ -53,7 +53,7 @@ class SessionState:
     `person` is who teaches and `layout` the twin's, as it is now. Counts go on from day to day: `laps` (of teaching),
     `passed`, `collisions` and `lost` too. `alone` is the share of steps since the demonstration in which no
     person drove, `curve` the same of each lap. Of `shown` proving laps the novice has passed `proven`. `words` is the
-    newest verdict.
+    newest verdict, and `converged` whether it is that the novice passed.
     """
 
     stamp_s: float
@@ -72,6 +72,7 @@ class SessionState:
     proven: int = 0
     shown: int = 0
     words: str = ""
+    converged: bool = False
 
 
 @dataclass(frozen=True, slots=True)

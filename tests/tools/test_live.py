@@ -205,12 +205,15 @@ def test_the_board_counts_laps_and_tells_a_new_stage_at_once():
     board.show(Stage.TEACHING, 3)
     board.show(Stage.TEACHING, 3)  # too soon to be told again
     board.end_lap(Tally(steps=10, human_steps=4), lap(Phase.TRAIN, collisions=2))
-    board.note_proof([lap(Phase.PROVE), lap(Phase.UNSEEN, passed=False)], "words")
+    board.note_proof([lap(Phase.PROVE), lap(Phase.UNSEEN, passed=False)])
+    board.note_verdict("words", converged=True)
     board.show(Stage.VERDICT, 4)
     assert [(state.stage, state.layout) for state in told] == [(Stage.TEACHING, 3), (Stage.VERDICT, 4)]
     last = told[-1]
     assert (last.person, last.laps, last.passed, last.collisions, last.words) == ("ada", 1, 1, 2, "words")
-    assert (last.curve, last.proven, last.shown) == ((pytest.approx(0.6),), 1, 2)
+    assert (last.curve, last.proven, last.shown, last.converged) == ((pytest.approx(0.6),), 1, 2, True)
+    board.begin_lap()
+    assert (board.state.shown, board.state.converged) == (0, False)  # it goes on being taught
     assert "60% driven without you" in said[0]
 
 

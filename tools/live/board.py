@@ -1,7 +1,7 @@
 """What a session tells while it goes on: on the bus for every screen, and in the terminal."""
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 from lira.fusion.log.counts import Ledger
@@ -66,7 +66,7 @@ class Board:
 
     def begin_lap(self) -> int:
         """Count one more lap of teaching. What was proven was another novice's."""
-        self.state = replace(self.state, laps=self.state.laps + 1, proven=0, shown=0)
+        self.state = replace(self.state, laps=self.state.laps + 1, proven=0, shown=0, converged=False)
         return self.state.laps
 
     def end_lap(self, tally: Tally, record: LapRecord) -> None:
@@ -85,7 +85,10 @@ class Board:
             f"collisions {record.collisions}, lost {record.lost}, {record.human_labels} labels of yours"
         )
 
-    def note_proof(self, proof: list[LapRecord], words: str = "") -> None:
+    def note_proof(self, proof: Sequence[LapRecord]) -> None:
         """So far the novice has driven this alone."""
-        proven = sum(lap.passed for lap in proof)
-        self.state = replace(self.state, proven=proven, shown=len(proof), words=words or self.state.words)
+        self.state = replace(self.state, proven=sum(lap.passed for lap in proof), shown=len(proof))
+
+    def note_verdict(self, words: str, *, converged: bool) -> None:
+        """The proof is over."""
+        self.state = replace(self.state, words=words, converged=converged)

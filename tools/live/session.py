@@ -131,7 +131,8 @@ class LiveSession:
         """The novice alone: on a twin here and on unseen layouts, on a floor as the person judges."""
         self._proof = []
         words = self._judge() if self._course is None else self._examine(self._course, layout)
-        self.board.note_proof(self._proof, words)
+        self.board.note_proof(self._proof)
+        self.board.note_verdict(words, converged=self.converged)
         self._say(f"verdict: {words}. {'It passed' if self.converged else 'Not yet'}: stop, or go on?")
 
     def _judge(self) -> str:
