@@ -10,7 +10,7 @@ EXPERTS := $(foreach task,line eight passage garden corridor,camera:--task:$(tas
 BENCHES := twin lockstep latency train preprocess step log drivers takeover
 
 .DEFAULT_GOAL := help
-.PHONY: help setup demo test test-fast check docs generated bench results experts wheel clean
+.PHONY: help setup foreign demo test test-fast check docs generated bench results experts wheel clean
 
 help: ## list what can be made
 	@awk -F ':[^#]*## ' '/^[a-z-]+:.*## / {printf "  make %-10s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
@@ -24,6 +24,12 @@ $(VENV)/.installed: pyproject.toml constraints.txt
 	@$(BIN)/python -m pip --version >/dev/null 2>&1 || $(PYTHON) -m venv --clear $(VENV)
 	$(BIN)/python -m pip install --quiet --constraint constraints.txt --editable '.[dev]'
 	@touch $@
+
+# Nothing of it is needed to use the project: tests that find none are skipped, and say so.
+foreign: ## ROS 2, a peer of rmw_zenoh and Foxglove's decoders, for tests against them, into .foreign
+	$(PYTHON) -m venv .foreign
+	.foreign/bin/python -m pip install --quiet --requirement tests/foreign.txt
+	npm install --silent --prefix .foreign @foxglove/rosmsg@5 @foxglove/rosmsg2-serialization@3
 
 demo: setup ## teach a robot in the twin, from start to report
 	$(BIN)/lira demo
@@ -67,4 +73,4 @@ wheel: setup ## the wheel, into dist/
 	$(BIN)/python -m pip wheel --quiet --no-deps --wheel-dir dist .
 
 clean: ## forget .venv, runs/, site/ and what was built
-	rm -rf $(VENV) runs site build dist
+	rm -rf $(VENV) .foreign runs site build dist

@@ -23,9 +23,11 @@ ROOMS = {
         "clock": set(),
         "plugins": {"errors"},
         "messages": {"errors"},
+        "rmw": {"errors", "messages"},
         "profile": {"errors", "config", "messages"},
         "port": {"messages", "profile"},
         "bus": {"errors", "clock", "messages", "profile"},
+        "ros_graph": {"errors", "messages", "rmw", "bus"},
         "safety": {"clock", "messages", "profile", "port"},
         "server": {"errors", "clock", "messages", "profile", "port", "bus", "safety"},
         "client": {"errors", "clock", "messages", "profile", "bus"},
@@ -47,8 +49,7 @@ ROOMS = {
     },
 }
 MOST_MODULES = 16  # in one folder
-# An experiment's parts are many; the rest waits for a better order.
-MORE_MODULES = {"tools/experiments": 18, "tools/joystick": 20}
+MORE_MODULES = {"tools/joystick": 20}
 NOT_ON_THE_ROBOT = {"torch", "pybullet", "pygame", "safetensors", "matplotlib"}
 
 

@@ -30,6 +30,8 @@ EXTRAS = {
     "threadpoolctl": "drive",
     "pygame": "console",
     "cryptography": "keys",
+    "foxglove": "view",
+    "prometheus_client": "view",
 }
 
 EXIT_ERROR = 2

@@ -19,6 +19,13 @@ def natural(text: str) -> int:
     return value
 
 
+def port(text: str) -> int:
+    """Read a port to serve on; 0 is any that is free."""
+    if not text.isdecimal() or not 0 <= int(text) < 65536:
+        raise argparse.ArgumentTypeError(f"'{text}' is no port: 0 to 65535")
+    return int(text)
+
+
 def add_client(parser: argparse.ArgumentParser) -> None:
     """Declare which robot on the bus is meant: `--name` and `--connect`."""
     add = parser.add_argument

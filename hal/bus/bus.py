@@ -8,11 +8,13 @@ import secrets
 import time
 from collections import Counter
 from collections.abc import Iterator
+from functools import partial
 from typing import Any, TypeVar
 
 import zenoh
 
 from lira.hal.bus.access_log import Refusals
+from lira.hal.bus.attachment import Attachment
 from lira.hal.bus.boundary import Boundary
 from lira.hal.bus.connection import Connection
 from lira.hal.bus.endpoint import DEFAULT_ROBOT, check_address, check_name, is_loopback
@@ -100,8 +102,8 @@ class Bus:
     def publisher(self, topic: Topic[M], qos: Qos | None = None) -> Publisher[M]:
         """Declare a publisher; `qos` replaces the table's."""
         key = self._key(self._own(topic).key)
-        count = self._counts.setdefault(key, itertools.count(1))
-        return Publisher(self._connection, key, topic, qos or topic.qos, self.epoch, count)
+        attach = partial(_attach, self.epoch, self._counts.setdefault(key, itertools.count(1)))
+        return Publisher(self._connection, key, topic, qos or topic.qos, attach)
 
     def put_raw(self, topic: Topic[Any], payload: bytes, attachment: bytes | None = None) -> None:
         """Send bytes as they are: for relays, recorders and tests of what a bus has to bear."""
@@ -194,3 +196,8 @@ class Bus:
 
     def _key(self, key: str) -> str:
         return f"{self._prefix}/{key}" if self._prefix else key
+
+
+def _attach(epoch: int, count: Iterator[int], time_s: float, seq: int | None, answers: int, *, released: bool) -> bytes:
+    number = next(count) if seq is None else seq
+    return Attachment(epoch, number, round(time_s * 1e9), answers, released).to_bytes()

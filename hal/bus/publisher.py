@@ -1,12 +1,10 @@
 """What puts messages on the bus, each with its attachment."""
 
-from collections.abc import Iterator
-from typing import Any, Generic, TypeVar
+from typing import Any, Generic, Protocol, TypeVar
 
 import zenoh
 from zenoh import ext
 
-from lira.hal.bus.attachment import Attachment
 from lira.hal.bus.connection import Connection
 from lira.hal.bus.topics import Qos, Topic
 from lira.hal.errors import BusError
@@ -15,18 +13,22 @@ from lira.hal.messages.codec import encode
 M = TypeVar("M")
 
 
-class Publisher(Generic[M]):
-    """Publishes a topic on one key; what it sends is of the session `epoch`, and counted by `count`."""
+class Attach(Protocol):
+    """What makes the attachment of a message; the arguments are those of `Publisher.put`."""
 
-    def __init__(
-        self, connection: Connection, key: str, topic: Topic[M], qos: Qos, epoch: int, count: Iterator[int]
-    ) -> None:
+    def __call__(self, time_s: float, seq: int | None, answers: int, *, released: bool) -> bytes:
+        """Return it."""
+
+
+class Publisher(Generic[M]):
+    """Publishes a topic on one key, each message with what `attach` makes."""
+
+    def __init__(self, connection: Connection, key: str, topic: Topic[M], qos: Qos, attach: Attach) -> None:
         self._connection = connection
         self._key = key
         self._qos = qos
         self._encoding = zenoh.Encoding.APPLICATION_CDR.with_schema(topic.ros_type)
-        self._epoch = epoch
-        self._count = count
+        self._attach = attach
         self._kept: tuple[bytes, bytes] | None = None
         self._publisher = connection.declare(self._anew)
 
@@ -43,8 +45,7 @@ class Publisher(Generic[M]):
         Raises `BusError` when the session is closed, `CodecError` for what ROS cannot hold.
         """
         payload = encode(message)
-        number = next(self._count) if seq is None else seq
-        attachment = Attachment(self._epoch, number, round(time_s * 1e9), answers, released).to_bytes()
+        attachment = self._attach(time_s, seq, answers, released=released)
         if self._qos.latched:
             self._kept = payload, attachment
         try:

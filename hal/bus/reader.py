@@ -22,8 +22,9 @@ M = TypeVar("M")
 class Received(Generic[M]):
     """A message as it came. `arrived_s` is when it was polled, on this machine's monotonic clock.
 
-    `key` is the whole key that it came on. `sender` is the id of the session that put it, "" if that does not stamp
-    what it puts (ours and ROS bridges do).
+    `key` is the whole key that it came on, `payload` the message as it travelled, `attached` what was attached, whoever's
+    it is. `sender` is the id of the session that put it, "" if that does not stamp what it puts (ours and ROS bridges
+    do).
     """
 
     message: M
@@ -31,6 +32,8 @@ class Received(Generic[M]):
     arrived_s: float
     key: str = ""
     sender: str = ""
+    payload: bytes = b""
+    attached: bytes | None = None
 
     @property
     def commander(self) -> str:
@@ -75,9 +78,9 @@ class Reader(Generic[M]):
         if len(sample.payload) > self._topic.max_bytes or (attached is not None and len(attached) > ATTACHMENT_BYTES):
             self._boundary.refuse(self._topic.key, "too long")
             return None
-        message = decode(self._topic.kind, bytes(sample.payload))
-        sent = parse_attachment(None if attached is None else bytes(attached))
-        return Received(message, sent, time.monotonic(), str(sample.key_expr), self._sender(sample))
+        payload, beside = bytes(sample.payload), None if attached is None else bytes(attached)
+        message, sent, arrived_s = decode(self._topic.kind, payload), parse_attachment(beside), time.monotonic()
+        return Received(message, sent, arrived_s, str(sample.key_expr), self._sender(sample), payload, beside)
 
     def newest(self) -> Received[M] | None:
         """Return the newest message that ever came, however old it is."""

@@ -18,7 +18,7 @@ PADDED_BYTES = 16
 
 # rosbags raises its own error for what it checks and these for what it does not; a value that no enum or array
 # shape takes ends in the same family.
-_MALFORMED = (
+MALFORMED = (
     SerdeError,
     struct.error,
     ValueError,
@@ -46,7 +46,7 @@ def encode(message: object) -> bytes:
     codec = CODECS[type(message)]
     try:
         return bytes(TYPES.serialize_cdr(codec.to_ros(message), codec.ros_type))
-    except _MALFORMED as error:
+    except MALFORMED as error:
         raise CodecError(f"cannot encode {type(message).__name__}: {error}") from error
 
 
@@ -56,7 +56,7 @@ def decode(kind: type[M], data: bytes) -> M:
     try:
         message: M = codec.from_ros(TYPES.deserialize_cdr(data, codec.ros_type))
         check(message)
-    except _MALFORMED as error:
+    except MALFORMED as error:
         raise CodecError(f"{len(data)} bytes are no {codec.ros_type}: {error}") from error
     return message
 

@@ -1,4 +1,7 @@
-"""A robot behind zenoh-bridge-ros2dds as a `hal.port.Robot`: its topics are read and written as ROS 2 has them."""
+"""A robot that runs ROS 2 as a `hal.port.Robot`: its topics are read and written as ROS 2 has them.
+
+How its messages come and go is `transport.py`'s: behind zenoh-bridge-ros2dds, or in a graph of rmw_zenoh.
+"""
 
 import math
 import threading
@@ -7,7 +10,6 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any
 
-from lira.hal.bus.bus import Bus
 from lira.hal.bus.publisher import Publisher
 from lira.hal.bus.reader import Reader
 from lira.hal.bus.sensors import SENSORS, listened_to, observation_of
@@ -18,6 +20,7 @@ from lira.hal.messages import STOP, Applied, Command, Observation, Reason, Twist
 from lira.hal.port import DeviceHealth
 from lira.hal.profile import RobotProfile
 from lira.robot.ros2.forms import placed_scan, plain_picture
+from lira.robot.ros2.transport import BRIDGE, Form, Transport
 
 SENSED: dict[str, Topic[Any]] = {sensor.name: sensor.topic for sensor in SENSORS}
 NEEDED = {"scan": "lidar", "camera": "camera"}
@@ -29,7 +32,6 @@ LOOK_S = 0.002
 SEND_S = 0.05
 STOOD_S = 0.1  # nobody here waits so long before it looks at the time again
 FAREWELL = 3
-BRIDGE = "Does zenoh-bridge-ros2dds run there and let this topic through? Name it with --topic NAME=ROS_TOPIC."
 
 
 @dataclass(frozen=True, slots=True)
@@ -64,14 +66,15 @@ class Ros2Robot:
     of it, nobody here knows. Its "lidar" or "camera" is lost while no new scan or picture comes.
     """
 
-    def __init__(self, profile: RobotProfile, bus: Bus, interface: Interface) -> None:
+    def __init__(self, profile: RobotProfile, far: Transport, interface: Interface, form: Form = BRIDGE) -> None:
         self._profile = profile
-        self._bus = bus
+        self._far = far
+        self._form = form
         self._interface = interface
         self._readers: dict[str, Reader[Any]] = {
-            sensor.name: bus.reader(interface.topic(sensor.name)) for sensor in listened_to(profile)
+            sensor.name: far.reader(interface.topic(sensor.name)) for sensor in listened_to(profile)
         }
-        self._wheels: Publisher[Any] = bus.publisher(interface.topic(COMMANDED))
+        self._wheels: Publisher[Any] = far.publisher(interface.topic(COMMANDED))
         self._newest: dict[str, Any] = {}
         self._open = False
         self._seq = 0
@@ -92,14 +95,16 @@ class Ros2Robot:
         while (lost := self._silent()) and time.monotonic() < until_s:
             self._listen()
             time.sleep(LOOK_S)
-        if lost and self._bus.peers() == 0:
-            what = f"no bridge answers at {self._bus.endpoint}"
-            raise BusError(what, "Does zenoh-bridge-ros2dds run there, and is the address right?")
+        if lost and self._far.peers() == 0:
+            what = f"no {self._form.nobody} answers at {self._far.endpoint}"
+            raise BusError(what, f"Does {self._form.program} run there, and is the address right?")
         for name in lost:
             key = self._interface.topic(name).key
             stamp = getattr(self._newest.get(name), "stamp_s", None)
             what = f"nothing comes on '{key}'" if stamp is None else f"what comes on '{key}' is stamped {stamp:.1f} s"
-            raise DeviceError(what, BRIDGE if stamp is None else "Its driver has to stamp with the robot's own clock.")
+            raise DeviceError(
+                what, self._form.silent if stamp is None else "Its driver has to stamp with the robot's own clock."
+            )
         self._open = True
 
     def read(self) -> Observation:
@@ -153,7 +158,7 @@ class Ros2Robot:
 
     def troubles(self) -> dict[str, str]:
         """What is missing, each with its remedy."""
-        return {name: f"'{self._interface.topic(name).key}' is silent. {BRIDGE}" for name in self._silent()}
+        return {name: f"'{self._interface.topic(name).key}' is silent. {self._form.silent}" for name in self._silent()}
 
     def _now(self) -> float:
         """The robot's time. If this process stood still it counts that itself: what comes first is of before, and by
@@ -176,7 +181,7 @@ class Ros2Robot:
         for name, reader in self._readers.items():
             for received in reader.poll():
                 news = True
-                with self._bus.boundary.guard(name):
+                with self._far.boundary.guard(name):
                     value = received.message
                     if name in CLOCKS:
                         with self._lock:

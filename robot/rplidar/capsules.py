@@ -1,4 +1,4 @@
-"""The express, ultra and dense streams: capsules with a checksum and one angle for many points. Vectorised.
+"""The express, ultra and both dense streams: capsules with a checksum and one angle for many points. Vectorised.
 
 A capsule says where its first point is. How far it spans is taken from the way to it from the one before, for the head
 turns evenly, so that no point has to wait for the capsule after it. One that does not follow from the one before gives
@@ -15,12 +15,14 @@ from numpy.typing import NDArray
 
 from lira.robot.rplidar.points import CORRECTION_RAD, FASTEST_HZ, NOTHING, Bytes, Floats, Points
 
-HEAD_SIZE = 4  # check nibbles and the start angle
+CHECK_SIZE, ANGLE_SIZE = 2, 2
 SPANS = 15  # so many capsules tell how far one spans
 # A capsule so many times as far from the one before as they are of late, and a bit, does not follow it.
 STRETCH, SLACK_DEG = 1.5, 0.5
 # The ultra stream counts millimetres in steps: from these counts on, as of these distances, in steps of 2 ** level.
 SCALES = np.array([(0, 0, 0), (512, 512, 1), (1280, 2048, 2), (1792, 4096, 3), (3328, 16384, 4)])
+# The ultra dense stream, by its two lowest bits: from how many millimetres on, in steps of how many, in how many bits.
+STEPS = np.array([(0, 2, 10), (2046, 3, 11), (8187, 4, 12), (24567, 5, 13)])
 NO_RETURN = (-512, 511)  # of ten bits
 # How far behind the head's direction a point at a distance lies, which the ultra stream leaves to us: so far without a
 # distance; else so far at infinity, less so much over the distance.
@@ -32,7 +34,8 @@ NEAREST_M = 0.05
 class Layout:
     """One answer type. `read`: bodies [n, m] become metres and degrees behind the head [n, points].
 
-    `ahead`: so many points at the end of a body are only known with the next one; in the last row they are nan.
+    `angle_at`: byte of the start angle, before the body. `ahead`: so many points at the end of a body are only known
+    with the next one; in the last row they are nan.
     """
 
     size: int
@@ -40,6 +43,12 @@ class Layout:
     read: Callable[[Bytes], tuple[Floats, Floats]]
     back_rad: float
     ahead: int = 0
+    angle_at: int = CHECK_SIZE
+
+    def starts(self, capsules: Bytes) -> tuple[Floats, NDArray[np.bool_]]:
+        """Start angles of capsules [n] in degrees, and which of them begin a stream."""
+        words = capsules[:, self.angle_at].astype(np.uint16) | capsules[:, self.angle_at + 1].astype(np.uint16) << 8
+        return (words & 0x7FFF) / 64.0, words >> 15 == 1
 
 
 class CapsuleDecoder:
@@ -101,8 +110,7 @@ class CapsuleDecoder:
 
     def _take(self, run: Bytes) -> tuple[Floats, Floats, int]:
         """Points of good capsules [n] in a row, and how many capsules are missing between them."""
-        words = run[:, 2].astype(np.uint16) | run[:, 3].astype(np.uint16) << 8
-        start_deg, begins = (words & 0x7FFF) / 64.0, words >> 15 == 1
+        start_deg, begins = self._layout.starts(run)
         gap_deg = np.diff(start_deg, prepend=self._start_deg) % 360.0
         self._start_deg = float(start_deg[-1])
         told = ~begins & np.isfinite(gap_deg)
@@ -125,11 +133,11 @@ class CapsuleDecoder:
             if self._newest is not None:
                 before, before_deg = self._newest
                 run = np.concatenate([before[None], run])
-                first_deg = (int(before[2]) | int(before[3]) << 8) % 0x8000 / 64.0
+                first_deg, _ = self._layout.starts(before[None])
                 start_deg, span_deg = np.append(first_deg, start_deg), np.append(before_deg, span_deg)
                 wanted = np.concatenate([[[*[False] * (count - ahead), *[follows[0]] * ahead]], wanted])
             self._newest = (run[-1].copy(), float(span_deg[-1])) if follows[-1] else None
-        distance_m, behind_deg = self._layout.read(run[:, HEAD_SIZE:])
+        distance_m, behind_deg = self._layout.read(run[:, self._layout.angle_at + ANGLE_SIZE :])
         theta_deg = start_deg[:, None] + np.nan_to_num(span_deg)[:, None] * (np.arange(count) / count) - behind_deg
         return np.radians(theta_deg[wanted] % 360.0), distance_m[wanted]
 
@@ -138,7 +146,7 @@ def _checks(capsules: Bytes) -> NDArray[np.bool_]:
     """Which capsules [n, size] have their check nibbles and their sum right."""
     nibbles = ((capsules[:, 0] >> 4) == 0xA) & ((capsules[:, 1] >> 4) == 0x5)
     given = (capsules[:, 0] & 0x0F) | capsules[:, 1] << 4
-    ok: NDArray[np.bool_] = nibbles & (given == np.bitwise_xor.reduce(capsules[:, 2:], axis=1))
+    ok: NDArray[np.bool_] = nibbles & (given == np.bitwise_xor.reduce(capsules[:, CHECK_SIZE:], axis=1))
     return ok
 
 
@@ -156,6 +164,16 @@ def read_dense(bodies: Bytes) -> tuple[Floats, Floats]:
     """40 distances in mm, where the head looks."""
     words = np.ascontiguousarray(bodies).view("<u2")
     return words / 1000.0, np.zeros((1, 1))
+
+
+def read_ultra_dense(bodies: Bytes) -> tuple[Floats, Floats]:
+    """32 cabins of two points, 20 bits each: quality, a distance, and the steps that it is counted in."""
+    cabins = bodies.reshape(len(bodies), 32, 5).astype(np.int64)
+    low = np.stack([cabins[..., 0] | cabins[..., 1] << 8, cabins[..., 2] | cabins[..., 3] << 8], axis=-1)
+    high = np.stack([cabins[..., 4] & 0x0F, cabins[..., 4] >> 4], axis=-1)
+    bits = (low | high << 16).reshape(len(bodies), ULTRA_DENSE.points)
+    from_mm, step_mm, width = np.moveaxis(STEPS[bits & 0x3], -1, 0)
+    return (from_mm + (bits >> 2 & (1 << width) - 1) * step_mm) / 1000.0, np.zeros((1, 1))
 
 
 def read_ultra(bodies: Bytes) -> tuple[Floats, Floats]:
@@ -188,3 +206,5 @@ def _differ(bits: NDArray[np.int64], base_mm: NDArray[np.int64], level: NDArray[
 EXPRESS = Layout(84, 32, read_express, CORRECTION_RAD)
 ULTRA = Layout(132, 96, read_ultra, CORRECTION_RAD, ahead=2)
 DENSE = Layout(84, 40, read_dense, 0.0)
+# After the check a time and a state of the unit, which nothing here needs.
+ULTRA_DENSE = Layout(170, 64, read_ultra_dense, 0.0, angle_at=8)

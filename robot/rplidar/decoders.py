@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Mapping
 
-from lira.robot.rplidar.capsules import DENSE, EXPRESS, ULTRA, CapsuleDecoder
+from lira.robot.rplidar.capsules import DENSE, EXPRESS, ULTRA, ULTRA_DENSE, CapsuleDecoder
 from lira.robot.rplidar.nodes import NodeDecoder
 from lira.robot.rplidar.points import Decoder
 from lira.robot.rplidar.protocol import Answer
@@ -13,6 +13,7 @@ MakeDecoder = Callable[[float], Decoder]
 DECODERS: Mapping[Answer, MakeDecoder] = {
     Answer.ULTRA: lambda sample_s: CapsuleDecoder(ULTRA, sample_s),
     Answer.DENSE: lambda sample_s: CapsuleDecoder(DENSE, sample_s),
+    Answer.ULTRA_DENSE: lambda sample_s: CapsuleDecoder(ULTRA_DENSE, sample_s),
     Answer.EXPRESS: lambda sample_s: CapsuleDecoder(EXPRESS, sample_s),
     Answer.STANDARD: NodeDecoder,
 }

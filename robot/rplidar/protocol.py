@@ -36,6 +36,7 @@ class Answer(IntEnum):
     EXPRESS = 0x82
     ULTRA = 0x84
     DENSE = 0x85
+    ULTRA_DENSE = 0x86
     ACC_BOARD = 0xFF
 
 

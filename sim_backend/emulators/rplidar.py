@@ -13,13 +13,14 @@ import numpy as np
 
 from lira.sim_backend.emulators.rplidar_head import NO_SAMPLES, Distances, Head, Optics, Samples
 from lira.sim_backend.emulators.rplidar_models import EXPRESS_MODE, STANDARD_MODE, Model, ScanMode
-from lira.sim_backend.emulators.rplidar_streams import encode_dense, encode_express, encode_nodes, encode_ultra
+from lira.sim_backend.emulators.rplidar_streams import ENCODERS, encode_express, encode_nodes
 from lira.sim_backend.polyline import Floats
 
 SERIAL = bytes(range(0xA0, 0xB0))
 BACKLOG_S = 0.05  # what the line cannot carry by then never leaves: the unit has little memory
 REQUEST_S = 5.0  # half a request is forgotten after so long
 BITS = 10  # of a byte on the line
+UNCORRECTED = {0x85, 0x86}  # answer types whose points lie where the head looks
 SLOWEST_HZ, FASTEST_HZ = 5, 15
 VENDORS_PWM = 600
 PROTECTED = 0x8008  # code of the error
@@ -208,7 +209,7 @@ class RplidarUnit:
         at_s: Floats = self._began_s + np.arange(self._taken, taken, dtype=np.float64) * mode.sample_s
         self._taken = taken
         theta_rad = self.head.turns(at_s) % 1.0 * math.tau
-        self._pending = self._pending.then(self._optics.look(theta_rad, corrected=mode.answer != 0x85))
+        self._pending = self._pending.then(self._optics.look(theta_rad, corrected=mode.answer not in UNCORRECTED))
         while len(self._pending.theta_rad) >= mode.points + beyond:
             packet = self._packet(mode, self._pending.part(0, mode.points + beyond))
             self._pending = self._pending.part(mode.points)
@@ -224,8 +225,7 @@ class RplidarUnit:
         first = self._sent == 0
         if mode.answer == 0x82:
             return encode_express(theta_rad[:1], distance_m[None], first, samples.behind_rad[None])
-        encode = encode_ultra if mode.answer == 0x84 else encode_dense
-        return encode(theta_rad[:1], distance_m[None], first)
+        return ENCODERS[mode.answer](theta_rad[:1], distance_m[None], first)
 
     def _send(self, data: bytes, ready_s: float) -> None:
         """Put bytes on the line once it is free; a packet that would come too late is dropped."""

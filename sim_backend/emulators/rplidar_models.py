@@ -19,6 +19,7 @@ STANDARD_MODE = ScanMode(0x81, 1, 5, 500e-6)
 EXPRESS_MODE = ScanMode(0x82, 32, 84, 250e-6, "Express")
 ULTRA_MODE = ScanMode(0x84, 96, 132, 127e-6, "Sensitivity")
 DENSE_MODE = ScanMode(0x85, 40, 84, 62.5e-6, "DenseBoost")
+ULTRA_DENSE_MODE = ScanMode(0x86, 64, 170, 100e-6, "DenseBoost", 16.0)
 
 
 @dataclass(frozen=True, slots=True)

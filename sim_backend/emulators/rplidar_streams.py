@@ -15,6 +15,9 @@ HIGHEST_MM = 28671
 # Millimetres from these on are counted in steps of 2 ** level, and these counts say so.
 SCALES = ((16384, 3328, 4), (4096, 1792, 3), (2048, 1280, 2), (512, 512, 1), (0, 0, 0))
 
+# Scales of the ultra dense stream: from these millimetres on, in steps of so many, in so many bits.
+COARSENING = ((0, 2, 10), (2046, 3, 11), (8187, 4, 12), (24567, 5, 13))
+
 
 def encode_nodes(theta_rad: Floats, distance_m: Floats, starts: NDArray[np.bool_] | None = None) -> bytes:
     """Standard nodes [n]; `starts`: those that open a turn, of themselves the first after the unit's front."""
@@ -56,6 +59,24 @@ def encode_dense(start_rad: Floats, distance_m: Floats, first: bool = False) -> 
     return b"".join(seal(float(start), body.tobytes(), begins=first and number == 0) for number, (start, body) in pairs)
 
 
+def encode_ultra_dense(start_rad: Floats, distance_m: Floats, first: bool = False) -> bytes:
+    """Ultra dense capsules from start angles [n] and distances [n, 64]."""
+    stream = b""
+    for number, (start, distances) in enumerate(zip(start_rad.tolist(), distance_m, strict=True)):
+        one, two = (np.array([pack_twenty(round(each * 1000)) for each in distances[side::2]]) for side in (0, 1))
+        cabins = np.stack([one, one >> 8, two, two >> 8, one >> 16 | (two >> 16) << 4], axis=-1) & 0xFF
+        stream += seal(start, cabins.astype(np.uint8).tobytes(), begins=first and number == 0, before=bytes(6))
+    return stream
+
+
+def pack_twenty(mm: int) -> int:
+    """Twenty bits for a distance: its scale, its count, and above them a quality."""
+    scale = next(number for number in (3, 2, 1, 0) if mm >= COARSENING[number][0])
+    base_mm, step_mm, width = COARSENING[scale]
+    count = min(round((mm - base_mm) / step_mm), (1 << width) - 1)
+    return (scale | count << 2 | 0xFF << 2 + width) & 0xFFFFF
+
+
 def encode_ultra(start_rad: Floats, distance_m: Floats, first: bool = False) -> bytes:
     """Ultra capsules from start angles [n] and distances [n, 97]: the last of each is the next one's first.
 
@@ -88,9 +109,13 @@ def differ(mm: int, base_mm: int, level: int) -> int:
     return steps if mm > 0 and NOTHING_LOW < steps < NOTHING_HIGH else NOTHING_LOW
 
 
-def seal(start_rad: float, body: bytes, *, begins: bool = False) -> bytes:
-    """Put the head on a capsule: check nibbles with the sum, start angle, S."""
+def seal(start_rad: float, body: bytes, *, begins: bool = False, before: bytes = b"") -> bytes:
+    """Put the head on a capsule: check nibbles with the sum, what comes `before` the start angle, that angle, S."""
     angle = round(math.degrees(start_rad) * 64) % 23040 | (0x8000 if begins else 0)
-    checked = struct.pack("<H", angle) + body
+    checked = before + struct.pack("<H", angle) + body
     total = reduce(xor, checked)
     return bytes([0xA0 | total & 0x0F, 0x50 | total >> 4]) + checked
+
+
+ENCODERS = {0x84: encode_ultra, 0x85: encode_dense, 0x86: encode_ultra_dense}
+"""By answer type, those that need no more than start angles and distances."""

@@ -87,6 +87,21 @@ class Peer:
     """A robot behind a bridge. Its ROS clock is not this machine's. `silent` topics say nothing."""
 
     def __init__(self, port, namespace="", attach="no attachment", datagrams=False):
+        self._prefix = f"{namespace}/" if namespace else ""
+        self._attach = attach
+        self._offset_ns = 1_700_000_000 * 10**9
+        self._number = 0
+        self.silent = set()
+        self.commands = []
+        self._session = self._open(port, datagrams)
+        self._hears = self._subscribe()
+        self._stop = threading.Event()
+        pixels = np.full((48, 64, 3), 120, np.uint8)
+        self._jpeg = cv2.imencode(".jpg", pixels)[1].tobytes()
+        self._thread = threading.Thread(target=self._run)
+        self._thread.start()
+
+    def _open(self, port, datagrams):
         config = zenoh.Config()
         listen = [f"tcp/127.0.0.1:{port}"]
         if datagrams:
@@ -95,19 +110,13 @@ class Peer:
         config.insert_json5("mode", '"peer"' if datagrams else '"router"')
         config.insert_json5("listen/endpoints", json.dumps(listen))
         config.insert_json5("scouting/multicast/enabled", "false")
-        self._session = zenoh.open(config)
-        self._prefix = f"{namespace}/" if namespace else ""
-        self._attach = attach
-        self._offset_ns = 1_700_000_000 * 10**9
-        self._number = 0
-        self.silent = set()
-        self.commands = []
-        self._hears = self._session.declare_subscriber(f"{self._prefix}cmd_vel", self._hear)
-        self._stop = threading.Event()
-        pixels = np.full((48, 64, 3), 120, np.uint8)
-        self._jpeg = cv2.imencode(".jpg", pixels)[1].tobytes()
-        self._thread = threading.Thread(target=self._run)
-        self._thread.start()
+        return zenoh.open(config)
+
+    def _key(self, topic):
+        return self._prefix + topic
+
+    def _subscribe(self):
+        return self._session.declare_subscriber(self._key("cmd_vel"), self._hear)
 
     def now_ns(self):
         return time.monotonic_ns() + self._offset_ns
@@ -137,7 +146,7 @@ class Peer:
         self._number += 1
         if topic not in self.silent:
             attachment = attachment_of(self._attach, self._number, self.now_ns())
-            self._session.put(self._prefix + topic, payload, attachment=attachment)
+            self._session.put(self._key(topic), payload, attachment=attachment)
 
     def close(self):
         self._stop.set()

@@ -23,6 +23,7 @@ from lira.sim_backend.emulators.rplidar_models import (
     EXPRESS_MODE,
     MODELS,
     STANDARD_MODE,
+    ULTRA_DENSE_MODE,
     ULTRA_MODE,
     Model,
 )
@@ -82,6 +83,7 @@ UNITS = {
     "standard, oldest firmware": (Model(firmware=(1, 10), modes=(STANDARD_MODE,)), "STANDARD"),
     "express by table": (Model(), "EXPRESS"),
     "dense": (Model(baud=256000, modes=(STANDARD_MODE, EXPRESS_MODE, DENSE)), "DENSE"),
+    "ultra dense": (Model(baud=256000, modes=(STANDARD_MODE, EXPRESS_MODE, ULTRA_DENSE_MODE)), "ULTRA_DENSE"),
     "ultra": (Model(modes=(STANDARD_MODE, EXPRESS_MODE, ULTRA_MODE)), "ULTRA"),
     "ultra, fast": (Model(baud=256000, modes=(STANDARD_MODE, replace(ULTRA_MODE, sample_s=63e-6))), "ULTRA"),
     "standard only": (Model(modes=(STANDARD_MODE,)), "STANDARD"),
@@ -287,9 +289,15 @@ def test_the_motor_stops_on_sigterm_and_a_killed_program_does_not_spoil_the_next
         assert around(bench.wait_scans(1), 0) == pytest.approx(1.0, abs=0.02)
 
 
-@pytest.fixture(scope="module", params=["EXPRESS", "ULTRA", "DENSE", "STANDARD"])
+@pytest.fixture(scope="module", params=["EXPRESS", "ULTRA", "DENSE", "ULTRA_DENSE", "STANDARD"])
 def scanning(request, tmp_path_factory):
-    modes = {"EXPRESS": EXPRESS_MODE, "ULTRA": ULTRA_MODE, "DENSE": DENSE, "STANDARD": STANDARD_MODE}
+    modes = {
+        "EXPRESS": EXPRESS_MODE,
+        "ULTRA": ULTRA_MODE,
+        "DENSE": DENSE,
+        "ULTRA_DENSE": ULTRA_DENSE_MODE,
+        "STANDARD": STANDARD_MODE,
+    }
     model = Model(baud=256000, modes=(STANDARD_MODE, modes[request.param]))
     with Bench(tmp_path_factory.mktemp("wire") / "lidar", model) as bench:
         bench.wait_scans(1)

@@ -1,4 +1,5 @@
 import math
+import struct
 from itertools import pairwise
 
 import numpy as np
@@ -9,9 +10,16 @@ from hypothesis import strategies as st
 from lira.robot.rplidar import protocol
 from lira.robot.rplidar.decoders import DECODERS
 from lira.robot.rplidar.protocol import Answer
-from lira.sim_backend.emulators.rplidar_streams import encode_dense, encode_express, encode_nodes, encode_ultra, seal
+from lira.sim_backend.emulators.rplidar_streams import (
+    encode_dense,
+    encode_express,
+    encode_nodes,
+    encode_ultra,
+    encode_ultra_dense,
+    seal,
+)
 
-STANDARD_S, EXPRESS_S, ULTRA_S, DENSE_S = 500e-6, 250e-6, 127e-6, 62.5e-6
+STANDARD_S, EXPRESS_S, ULTRA_S, DENSE_S, ULTRA_DENSE_S = 500e-6, 250e-6, 127e-6, 62.5e-6, 100e-6
 STEP_RAD = math.radians(0.9)
 
 
@@ -50,11 +58,19 @@ def dense_stream():
     return encode_dense(theta[::40], distance.reshape(-1, 40), first=True), theta, distance
 
 
+def ultra_dense_stream():
+    theta, _ = sweep(64 * 15, math.radians(0.36))
+    number = np.arange(len(theta))  # in the steps that the stream has there: 2 mm, from 2.046 m on 3 mm
+    distance = np.where(number < 768, 500 + number * 2, 2046 + (number - 768) * 3) / 1000.0
+    return encode_ultra_dense(theta[::64], distance.reshape(-1, 64), first=True), theta, distance
+
+
 STREAMS = {
     "standard": (Answer.STANDARD, STANDARD_S, standard_stream(), 5, 1),
     "express": (Answer.EXPRESS, EXPRESS_S, express_stream(), 84, 32),
     "ultra": (Answer.ULTRA, ULTRA_S, ultra_stream(), 132, 96),
     "dense": (Answer.DENSE, DENSE_S, dense_stream(), 84, 40),
+    "ultra dense": (Answer.ULTRA_DENSE, ULTRA_DENSE_S, ultra_dense_stream(), 170, 64),
 }
 
 
@@ -198,6 +214,21 @@ def test_ultra_distances_are_the_vendors_own():
     assert got[:10].tolist() == [512, 522, 2048 - 7 * 4, 2048, 0, 0, 0, 4096 + 3 * 8, 4096 + 2 * 8, 4096]
 
 
+def test_ultra_dense_distances_are_the_vendors_own():
+    """Twenty bits a point: a scale of two bits, and counts of 2, 3, 4 and 5 mm from 0, 2046, 8187 and 24567 on."""
+    bits = [500 << 2 | 0x9 << 12, 1 | 10 << 2 | 0x7F << 13, 2 | 4095 << 2, 3 | 8191 << 2 | 0x1F << 15]
+    pairs = [*zip(bits[::2], bits[1::2], strict=True), *[(0, 0)] * 30]
+    cabins = b"".join(
+        struct.pack("<HHB", one & 0xFFFF, two & 0xFFFF, one >> 16 | (two >> 16) << 4) for one, two in pairs
+    )
+    decoder = DECODERS[Answer.ULTRA_DENSE](ULTRA_DENSE_S)
+    decoder.feed(seal(0.8, cabins, begins=True, before=bytes(6)))
+    got = decoder.feed(seal(1.0, cabins, before=b"\x12\x34\x56\x78\x9a\xbc"))
+    assert len(got) == 64
+    assert np.rint(got.distance_m[:5] * 1000).tolist() == [1000, 2076, 8187 + 4095 * 4, 24567 + 8191 * 5, 0]
+    assert got.theta_rad[0] == pytest.approx(1.0, abs=0.01)
+
+
 def test_a_capsule_that_begins_a_stream_does_not_continue_the_old_one():
     body = bytes(80)
     points = dense(seal(1.0, body), seal(1.2, body, begins=True) + seal(1.3, body))
@@ -244,8 +275,8 @@ def test_two_capsules_of_which_none_follows_the_other_are_no_error(decode, secon
 @given(
     angles=st.lists(st.floats(0.0, math.tau), min_size=1, max_size=40),
     begins=st.sets(st.integers(0, 40)),
-    name=st.sampled_from(["express", "ultra", "dense"]),
-    body=st.binary(min_size=128, max_size=128),
+    name=st.sampled_from(["express", "ultra", "dense", "ultra dense"]),
+    body=st.binary(min_size=166, max_size=166),
 )
 def test_legal_capsules_in_any_order_are_no_error(angles, begins, name, body):
     body = body[: STREAMS[name][3] - 4]

@@ -161,7 +161,7 @@ def test_the_demo_refuses_an_expert_that_is_not_there(lab, capsys):
 OWN = """
     from short_trials import short_trial
     from lira.tools.experiments.experiment import Experiment, Table
-    from lira.tools.experiments.measures import label_row, method_rows
+    from lira.tools.experiments.effort.measures import label_row, method_rows
 
     mine = Experiment(
         trials=lambda seeds: [short_trial({world!r}, seed=seed, name="mine") for seed in range(seeds)],

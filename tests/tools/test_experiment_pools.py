@@ -17,11 +17,11 @@ from short_trials import short_trial, timeless, write_world
 
 from lira.hal.errors import ConfigError
 from lira.tools.cli import main
-from lira.tools.experiments import fingerprint as fingerprints
-from lira.tools.experiments.fingerprint import code, fingerprint, imported, sources
-from lira.tools.experiments.kept import keep, kept
-from lira.tools.experiments.pools import Cluster, Here
-from lira.tools.experiments.runner import run_trials
+from lira.tools.experiments.playing import fingerprint as fingerprints
+from lira.tools.experiments.playing.fingerprint import code, fingerprint, imported, sources
+from lira.tools.experiments.playing.kept import keep, kept
+from lira.tools.experiments.playing.pools import Cluster, Here
+from lira.tools.experiments.playing.runner import run_trials
 from lira.tools.experiments.trial import play
 from lira.tools.launch.processes import free_port
 
@@ -101,7 +101,7 @@ def test_a_cluster_that_would_play_otherwise_is_refused(world, tmp_path, workers
 
 @pytest.mark.filterwarnings("default")
 def test_a_cluster_that_is_not_there_is_named(monkeypatch, tmp_path, capsys):
-    monkeypatch.setattr("lira.tools.experiments.pools.PATIENCE_S", 0.5)
+    monkeypatch.setattr("lira.tools.experiments.playing.pools.PATIENCE_S", 0.5)
     address = f"tcp://127.0.0.1:{free_port()}"
     assert main(["experiment", "tableC1", "--seeds", "1", "--run", str(tmp_path), "--scheduler", address]) == 2
     assert "no Dask scheduler answers" in capsys.readouterr().err
@@ -143,7 +143,7 @@ def test_progress_is_a_bar_on_a_terminal_and_lines_elsewhere(terminal):
     script = (
         "import sys; sys.path.insert(0, 'tests/tools')\n"
         "from made_up_outcomes import HOLD, outcome\n"
-        "from lira.tools.experiments.runner import Bar\n"
+        "from lira.tools.experiments.playing.runner import Bar\n"
         "with Bar(3, 1) as bar:\n"
         "    bar.note(outcome(HOLD, 7))\n"
     )
@@ -195,7 +195,7 @@ def test_the_fingerprint_covers_what_a_trial_runs_and_nothing_beside_it():
         "sim_backend/twin.py",
     } <= names
     assert {"hal/safety/governor.py", "tools/runs/build.py", "tools/experiments/trial.py"} <= names
-    assert not {"fusion/service.py", "tools/experiments/runner.py", "tools/cli.py"} & names
+    assert not {"fusion/service.py", "tools/experiments/playing/runner.py", "tools/cli.py"} & names
 
 
 def test_comments_and_docstrings_do_not_count_as_code(tmp_path):

@@ -11,8 +11,8 @@ from lira.fusion.log.counts import Account
 from lira.hal.errors import StorageError
 from lira.tools.cli import main
 from lira.tools.experiments import methods
+from lira.tools.experiments.effort.measures import driving_row, effort_row, label_row, source_rows
 from lira.tools.experiments.experiment import Finding, Picture
-from lira.tools.experiments.measures import driving_row, effort_row, label_row, source_rows
 from lira.tools.experiments.output import document
 from lira.tools.experiments.output.page import write_page
 from lira.tools.experiments.output.summary import read_summaries, read_summary, summarise, to_json

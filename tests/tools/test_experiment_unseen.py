@@ -8,8 +8,8 @@ from lira.fusion.methods import presets
 from lira.fusion.methods.syllabus import Syllabus
 from lira.fusion.teaching.teacher import UNSKILLED
 from lira.hal.errors import ConfigError
-from lira.tools.experiments import equal_quality
-from lira.tools.experiments.equal_quality import curve, reached, tail
+from lira.tools.experiments.effort import equal_quality
+from lira.tools.experiments.effort.equal_quality import curve, reached, tail
 from lira.tools.experiments.output import document, lead
 from lira.tools.experiments.output.summary import read_summary, summarise, to_json
 from lira.tools.experiments.quality import Judged, Point

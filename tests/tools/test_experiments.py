@@ -6,10 +6,10 @@ from short_trials import short_trial, timeless, write_world
 
 from lira.hal.errors import StorageError
 from lira.tools.cli import main
-from lira.tools.experiments.kept import kept
-from lira.tools.experiments.pools import Here
-from lira.tools.experiments.runner import run_trials
-from lira.tools.experiments.statistics import bootstrap, iqm, median_interval, paired_ratios
+from lira.tools.experiments.effort.statistics import bootstrap, iqm, median_interval, paired_ratios
+from lira.tools.experiments.playing.kept import kept
+from lira.tools.experiments.playing.pools import Here
+from lira.tools.experiments.playing.runner import run_trials
 from lira.tools.experiments.studies.compare import ratios, summary
 
 

@@ -5,7 +5,7 @@ from html import escape
 from itertools import combinations
 from statistics import median
 
-from lira.tools.experiments.statistics import median_interval
+from lira.tools.experiments.effort.statistics import median_interval
 from lira.tools.output.proven import share_words
 from lira.tools.report.page import section, styled
 from lira.tools.report.pair import table

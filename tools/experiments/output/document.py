@@ -6,10 +6,10 @@ from pathlib import Path
 from lira.hal.config import load_toml, write_whole
 from lira.hal.errors import ConfigError, StorageError
 from lira.tools.experiments.experiment import Finding, Row
-from lira.tools.experiments.fingerprint import ROOT
 from lira.tools.experiments.output.lead import LED_BY, NOT_YET, lead
 from lira.tools.experiments.output.markdown import table
 from lira.tools.experiments.output.summary import Summary
+from lira.tools.experiments.playing.fingerprint import ROOT
 
 SUMMARIES = ROOT / "tools" / "experiments" / "results"
 CAUSES = ROOT / "tools" / "experiments" / "causes.toml"

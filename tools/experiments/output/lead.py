@@ -6,10 +6,10 @@ from pathlib import Path
 
 from lira.hal.config import write_whole
 from lira.tools.bench import cell
+from lira.tools.experiments.effort.pairs import TOTAL
 from lira.tools.experiments.experiment import Picture, Row
 from lira.tools.experiments.output.markdown import table
 from lira.tools.experiments.output.summary import Summary
-from lira.tools.experiments.pairs import TOTAL
 
 LED_BY = "unseen"
 PARTS = "ablation"

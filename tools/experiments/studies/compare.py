@@ -4,9 +4,8 @@ from collections.abc import Sequence
 from functools import partial
 
 from lira.fusion.experts.tasks import task_of
-from lira.tools.experiments import pairs
-from lira.tools.experiments.experiment import Experiment, Finding, Outcomes, Picture, Row, Table
-from lira.tools.experiments.measures import (
+from lira.tools.experiments.effort import pairs
+from lira.tools.experiments.effort.measures import (
     by_method,
     driving_row,
     effort_row,
@@ -15,9 +14,10 @@ from lira.tools.experiments.measures import (
     method_rows,
     source_rows,
 )
+from lira.tools.experiments.effort.pairs import TOTAL, bounds, words
+from lira.tools.experiments.experiment import Experiment, Finding, Outcomes, Picture, Row, Table
 from lira.tools.experiments.methods import ALL, HG_DAGGER, LIRA, USUAL
 from lira.tools.experiments.output.pictures import box_pictures, spelt
-from lira.tools.experiments.pairs import TOTAL, bounds, words
 from lira.tools.experiments.trial import Preset, Trial
 
 QUANTITIES = ("human_labels", "interventions")

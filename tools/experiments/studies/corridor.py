@@ -6,8 +6,8 @@ import numpy as np
 
 from lira.fusion.methods.presets import METHODS
 from lira.hal.messages import Phase
+from lira.tools.experiments.effort.measures import by_method, effort_row, method_rows
 from lira.tools.experiments.experiment import Experiment, Finding, Outcomes, Picture, Row, Table
-from lira.tools.experiments.measures import by_method, effort_row, method_rows
 from lira.tools.experiments.output.pictures import box_pictures
 from lira.tools.experiments.trial import Outcome, Trial
 

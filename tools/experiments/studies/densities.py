@@ -7,8 +7,8 @@ import numpy as np
 
 from lira.fusion.log.counts import DEMONSTRATION
 from lira.hal.messages import Action, Driver
+from lira.tools.experiments.effort.measures import by_method
 from lira.tools.experiments.experiment import Experiment, Finding, Outcomes, Picture, Row, Table
-from lira.tools.experiments.measures import by_method
 from lira.tools.experiments.methods import DRAWN, FUSED, HG_DAGGER
 from lira.tools.experiments.studies.compare import trials
 from lira.tools.experiments.trial import Outcome

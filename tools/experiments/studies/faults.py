@@ -5,11 +5,11 @@ from dataclasses import replace
 import msgspec
 
 from lira.fusion.teaching.teacher import PERFECT, TEACHERS, UNSKILLED, TeacherSettings
+from lira.tools.experiments.effort.measures import driving_row, effort_row, grouped, label_row
+from lira.tools.experiments.effort.pairs import bounds, ratio, words
 from lira.tools.experiments.experiment import Experiment, Finding, Outcomes, Picture, Row, Table
-from lira.tools.experiments.measures import driving_row, effort_row, grouped, label_row
 from lira.tools.experiments.methods import HG_DAGGER, LIRA
 from lira.tools.experiments.output.pictures import box_pictures
-from lira.tools.experiments.pairs import bounds, ratio, words
 from lira.tools.experiments.trial import Outcome, Trial
 
 WORLD = "line-obstacles"

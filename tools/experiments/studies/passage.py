@@ -12,8 +12,8 @@ from lira.fusion.log.run_log import LapRecord
 from lira.fusion.methods.base import Alone
 from lira.fusion.methods.presets import METHODS
 from lira.hal.messages import Phase
+from lira.tools.experiments.effort.measures import by_method, median, method_rows
 from lira.tools.experiments.experiment import Experiment, Finding, Outcomes, Picture, Row, Table
-from lira.tools.experiments.measures import by_method, median, method_rows
 from lira.tools.experiments.notes import Notes, Track
 from lira.tools.experiments.trial import Outcome, Trial
 from lira.tools.runs.course import Course, run_course

@@ -1,11 +1,11 @@
 """Table D.1: LIRA-SPF with shared feedback on the figure-eight with boxes, at 0.5 m/s."""
 
 from lira.fusion.methods.presets import METHODS
-from lira.tools.experiments import pairs
+from lira.tools.experiments.effort import pairs
+from lira.tools.experiments.effort.measures import by_method, driving_row, effort_row, label_row, method_rows
+from lira.tools.experiments.effort.pairs import bounds, words
 from lira.tools.experiments.experiment import Experiment, Finding, Outcomes, Picture, Row, Table
-from lira.tools.experiments.measures import by_method, driving_row, effort_row, label_row, method_rows
 from lira.tools.experiments.output.pictures import box_pictures, spelt
-from lira.tools.experiments.pairs import bounds, words
 from lira.tools.experiments.trial import Trial
 
 PRESETS = ("thesis", "hold")

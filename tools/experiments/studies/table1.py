@@ -7,8 +7,8 @@ import numpy as np
 from lira.fusion.experts.files import experts_of
 from lira.fusion.experts.load import load_network
 from lira.fusion.methods.presets import METHODS
+from lira.tools.experiments.effort.measures import by_method
 from lira.tools.experiments.experiment import Experiment, Finding, Outcomes, Row, Table
-from lira.tools.experiments.measures import by_method
 from lira.tools.experiments.trial import Trial
 
 WORLD = "passage"

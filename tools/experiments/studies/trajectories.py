@@ -6,8 +6,8 @@ from functools import partial
 import numpy as np
 
 from lira.hal.messages import Phase
+from lira.tools.experiments.effort.measures import by_method, known, method_rows, time_to_finish_s
 from lira.tools.experiments.experiment import Experiment, Finding, Outcomes, Picture, Row, Table
-from lira.tools.experiments.measures import by_method, known, method_rows, time_to_finish_s
 from lira.tools.experiments.methods import DRAWN
 from lira.tools.experiments.notes import Track
 from lira.tools.experiments.studies.compare import trials

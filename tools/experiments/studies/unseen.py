@@ -13,8 +13,8 @@ from msgspec.structs import replace
 
 from lira.fusion.methods.presets import METHODS, RIVALS, Preset
 from lira.fusion.methods.syllabus import with_proof
-from lira.tools.experiments import equal_quality
-from lira.tools.experiments.equal_quality import (
+from lira.tools.experiments.effort import equal_quality
+from lira.tools.experiments.effort.equal_quality import (
     curve_rows,
     curve_table,
     effort_rows,
@@ -23,8 +23,8 @@ from lira.tools.experiments.equal_quality import (
     ratio_rows,
     way_rows,
 )
+from lira.tools.experiments.effort.measures import by_method
 from lira.tools.experiments.experiment import Experiment, Outcomes, Picture, Row, Table
-from lira.tools.experiments.measures import by_method
 from lira.tools.experiments.quality import Quality
 from lira.tools.experiments.trial import Outcome, Trial
 

@@ -4,11 +4,11 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from lira.fusion.methods.presets import METHODS, PLUS
-from lira.tools.experiments import pairs
-from lira.tools.experiments.equal_quality import effort_rows, quality_rows, reached, way_rows
+from lira.tools.experiments.effort import pairs
+from lira.tools.experiments.effort.equal_quality import effort_rows, quality_rows, reached, way_rows
+from lira.tools.experiments.effort.measures import by_method, driving_row, label_row, method_rows
+from lira.tools.experiments.effort.measures import effort_row as used_row
 from lira.tools.experiments.experiment import Experiment, Outcomes, Picture, Row, Table
-from lira.tools.experiments.measures import by_method, driving_row, label_row, method_rows
-from lira.tools.experiments.measures import effort_row as used_row
 from lira.tools.experiments.output.pictures import box_pictures
 from lira.tools.experiments.quality import Quality
 from lira.tools.experiments.studies import unseen

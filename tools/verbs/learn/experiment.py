@@ -106,8 +106,8 @@ def play(args: argparse.Namespace, name: str) -> "tuple[Summary, Path]":
     from lira.fusion.methods.presets import file_name
     from lira.tools.experiments.output.page import write_page
     from lira.tools.experiments.output.summary import summarise
-    from lira.tools.experiments.pools import Cluster, Here
-    from lira.tools.experiments.runner import run_trials
+    from lira.tools.experiments.playing.pools import Cluster, Here
+    from lira.tools.experiments.playing.runner import run_trials
     from lira.tools.experiments.selection import Selection
     from lira.tools.runs.expert_training import provide
 

@@ -23,7 +23,7 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from lira.tools.options import DEFAULT, add_client, add_layout
+from lira.tools.options import DEFAULT, add_client, add_layout, port
 
 if TYPE_CHECKING:
     from lira.tools.web.access import Access
@@ -34,15 +34,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add = parser.add_argument
     add_client(parser)
     add("--listen", default="127.0.0.1", metavar="HOST", help=f"where the page is served {DEFAULT}")
-    add("--port", type=_port, default=8080, help=f"0 takes any that is free {DEFAULT}")
+    add("--port", type=port, default=8080, help=f"0 takes any that is free {DEFAULT}")
     add_layout(parser, "the twin's layout, for the map")
     add("--screenshot", type=Path, metavar="FILE", help="write a picture of the page with a sample drive, and end")
-
-
-def _port(text: str) -> int:
-    if not text.isdecimal() or not 0 <= int(text) < 65536:
-        raise argparse.ArgumentTypeError(f"'{text}' is no port: 0 to 65535")
-    return int(text)
 
 
 def run(args: argparse.Namespace) -> int:

@@ -9,8 +9,8 @@ from lira.fusion.experts.tasks import TASKS, task_of
 from lira.fusion.log.run_log import LapRecord
 from lira.hal.messages import Driver, Phase
 from lira.hal.profile import load_profile
+from lira.tools.experiments.effort.statistics import iqm
 from lira.tools.experiments.experiment import Outcomes, Row
-from lira.tools.experiments.statistics import iqm
 from lira.tools.experiments.trial import Outcome
 
 

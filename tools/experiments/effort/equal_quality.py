@@ -4,9 +4,9 @@ from collections.abc import Mapping, Sequence
 
 import msgspec
 
-from lira.tools.experiments import pairs
+from lira.tools.experiments.effort import pairs
+from lira.tools.experiments.effort.measures import median
 from lira.tools.experiments.experiment import Outcomes, Row
-from lira.tools.experiments.measures import median
 from lira.tools.experiments.quality import Judged, Point
 from lira.tools.experiments.trial import Outcome
 from lira.tools.output.proven import share

@@ -3,8 +3,8 @@
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Protocol
 
+from lira.tools.experiments.effort.statistics import median_interval, paired_ratios
 from lira.tools.experiments.experiment import Row
-from lira.tools.experiments.statistics import median_interval, paired_ratios
 from lira.tools.experiments.trial import Outcome
 
 TOTAL = "human_labels and demonstration"

@@ -9,8 +9,8 @@ from typing import Self
 import msgspec
 from tqdm import tqdm
 
-from lira.tools.experiments.fingerprint import fingerprint
-from lira.tools.experiments.kept import keep, kept
+from lira.tools.experiments.playing.fingerprint import fingerprint
+from lira.tools.experiments.playing.kept import keep, kept
 from lira.tools.experiments.trial import Outcome, Trial
 
 Pool = Callable[[Sequence[Trial]], Iterator[Outcome]]

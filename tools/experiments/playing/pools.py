@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from lira.hal.errors import ConfigError
-from lira.tools.experiments.fingerprint import fingerprint
+from lira.tools.experiments.playing.fingerprint import fingerprint
 from lira.tools.experiments.trial import Outcome, Trial, play
 
 if TYPE_CHECKING:
