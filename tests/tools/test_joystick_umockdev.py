@@ -332,7 +332,7 @@ def test_learn_asks_and_writes_a_file_that_loads(bed, start, tmp_path):
         rig.says(f"... {name}", 2 if words == "EXPERT 3" else 1)
         send(PAD, name, rest)
     assert rig.process.wait(30.0) == 0  # the fourth expert goes unanswered
-    from lira.tools.joystick.mapping import load_mapping
+    from lira.tools.joystick.pads.mapping import load_mapping
 
     mapping = load_mapping(str(path))
     assert (mapping.forward.axis, mapping.forward.inverted, mapping.turn.axis) == ("ABS_Y", True, "ABS_RX")

@@ -8,8 +8,8 @@ from pathlib import Path
 
 from lira.hal.bus.keys import VARIABLE, keys_from_environment
 from lira.tools.doctor.finding import Finding, Patient, fail, ok, warn
-from lira.tools.joystick.nodes import is_any_pad, motion_of, read_nodes
-from lira.tools.joystick.rules import PLACE, REMEDY
+from lira.tools.joystick.device.rules import PLACE, REMEDY
+from lira.tools.joystick.pads.nodes import is_any_pad, motion_of, read_nodes
 
 PORT = 7447
 SERIAL = ("/dev/serial/by-id/*", "/dev/rplidar", "/dev/core2", "/dev/ttyUSB*", "/dev/ttyACM*")

@@ -3,8 +3,8 @@
 from dataclasses import dataclass
 
 from lira.tools.joystick.axes import PadState
-from lira.tools.joystick.codes import AXES, AXIS_NAMES, BUTTON_NAMES, BUTTONS, HALF
-from lira.tools.joystick.mapping import Axis
+from lira.tools.joystick.pads.codes import AXES, AXIS_NAMES, BUTTON_NAMES, BUTTONS, HALF
+from lira.tools.joystick.pads.mapping import Axis
 
 EXPERTS = "experts"
 MOVED = 0.7  # share of an axis's way from where it rested
