@@ -6,7 +6,7 @@ from pathlib import Path
 import msgspec
 import pytest
 
-from lira.fusion.log.run_log import ResultRecord, RunRecord, RunWriter, StepRecord, VerdictRecord
+from lira.fusion.log.run_log import LapRecord, ResultRecord, RunRecord, RunWriter, StepRecord, VerdictRecord
 from lira.hal.messages import Decision, LabelCounts, Phase
 from lira.tools.cli import main
 from lira.tools.report import write_comparison, write_report
@@ -81,6 +81,14 @@ def test_a_run_that_went_on_another_day_shows_all_its_days():
     run = digest([HEAD, *first, result, HEAD, *second, msgspec.structs.replace(result, human_labels=7)])
     assert (run.result.human_labels, run.result.simulated_s, run.result.elapsed_s) == (7, 120.0, 100.0)
     assert digest([HEAD, *first]).laps[0].title == "Training lap 0"
+
+
+def test_a_lap_that_was_cut_off_at_once_is_none():
+    steps = lap("nnnn").steps
+    later = [msgspec.structs.replace(s, decision=dataclasses.replace(s.decision, lap=2)) for s in lap("n" * 20).steps]
+    record = LapRecord(Phase.TRAIN, 0, 0, True, True, 0.8, 0, 0, None, 1, 1, 1, 1, 1, 1.0)
+    assert [len(each.steps) for each in digest([HEAD, *steps, record, *later[:3]]).laps] == [4]
+    assert [len(each.steps) for each in digest([HEAD, *steps, record, *later]).laps] == [4, 20]
 
 
 def test_two_runs_are_shown_side_by_side(tmp_path, capsys):

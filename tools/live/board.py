@@ -69,6 +69,10 @@ class Board:
         self.state = replace(self.state, laps=self.state.laps + 1, proven=0, shown=0, converged=False)
         return self.state.laps
 
+    def give_back_lap(self) -> None:
+        """The lap that has begun was none."""
+        self.state = replace(self.state, laps=self.state.laps - 1)
+
     def end_lap(self, tally: Tally, record: LapRecord) -> None:
         """A lap of teaching is over."""
         alone = 1.0 - tally.human_steps / max(1, tally.steps)

@@ -28,6 +28,8 @@ from lira.tools.live.verdict import has_passed, judged_words, verdict_words
 from lira.tools.runs.course import Course
 from lira.tools.runs.progress import Say
 
+MOMENT_S = 3.0  # a lap that is cut off so soon was none
+
 
 class LiveSession:
     """One sitting of a person; without a `course` on a floor."""
@@ -121,10 +123,13 @@ class LiveSession:
     def _teach(self, layout: int) -> LapRecord | None:
         """A lap of teaching; None if it was cut off."""
         number, self._proof = self.board.begin_lap(), []
+        began_s = self._driver.now()
         drive = None if self._course is None else self._course.lap(layout)
         record = self._driver.lap(self._classroom.method, drive, Phase.TRAIN, number)
         if record is not None:
             self._lessons.note_lap(record)
+        elif self._driver.now() < began_s + MOMENT_S:  # asked for the proof as the last lap ended
+            self.board.give_back_lap()
         return record
 
     def _prove(self, layout: int) -> None:

@@ -1,6 +1,6 @@
 """The records of one run, sorted into laps: what every part of the page is drawn from."""
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
@@ -18,6 +18,7 @@ from lira.fusion.log.run_log import (
 from lira.hal.errors import StorageError
 from lira.hal.messages import Action, Driver, Phase
 
+MOMENT_S = 2.0  # a lap of training that was cut off so soon was none: somebody asked for the proof
 PHASES = {Phase.TRAIN: "Training lap", Phase.PROVE: "Proving run", Phase.UNSEEN: "Unseen layout"}
 
 
@@ -125,8 +126,16 @@ class _Sorter:
             phase, number, layout = _key(self.steps[0])
         else:
             return
+        ended = bool(self.laps) and self.laps[-1].record is not None
+        if ended and record is None and phase == Phase.TRAIN and _lasted_s(self.steps) < MOMENT_S:
+            self.steps = []
+            return
         self.laps.append(Lap(phase, number, layout, tuple(self.steps), record, self.days))
         self.steps = []
+
+
+def _lasted_s(steps: Sequence[StepRecord]) -> float:
+    return steps[-1].decision.stamp_s - steps[0].decision.stamp_s
 
 
 def _key(step: StepRecord) -> tuple[Phase, int, int]:
@@ -145,6 +154,14 @@ def digest(records: Iterable[Record]) -> Run:
         for step in lap.steps[:1]:
             experts |= dict.fromkeys(view.name for view in step.decision.experts)
     return Run(sorter.head, tuple(laps), sorter.result, tuple(experts), sorter.verdict)
+
+
+def blinded(run: Run, letter: str) -> Run:
+    """The same run, of which nobody reads by which method it was taught."""
+    if run.head is None:
+        return run
+    name = f"Method {letter}"
+    return replace(run, head=structs.replace(run.head, method=name, preset=name, command=""))
 
 
 def load_run(path: Path) -> Run:

@@ -82,6 +82,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         default="hand",
         help="who drives: a hand, or on a twin a script with few, no or many human faults (for tests)",
     )
+    add("--shown-as", default="", help=argparse.SUPPRESS)  # in a study: the letter of a method that is not to be known
     add("--run", type=Path, metavar="DIR", help="folder of the session; one that is there goes on (default: a new one)")
 
 
@@ -112,7 +113,7 @@ def run(args: argparse.Namespace) -> int:
         else:
             say(f"drive '{args.name}' at {args.connect} with lira web, lira console or lira joystick")
         outcome = sit(args, plan, robot, rules, say)
-    return conclude(args.run, outcome.passed)
+    return conclude(args.run, outcome.passed, args.shown_as)
 
 
 def plan_of(args: argparse.Namespace) -> "Plan":
@@ -179,7 +180,7 @@ def script_of(args: argparse.Namespace) -> Iterator[None]:
         yield
 
 
-def conclude(folder: Path, passed: bool | None) -> int:
+def conclude(folder: Path, passed: bool | None, shown_as: str) -> int:
     """Write the report, and say where it is and what to do with it."""
     from lira.tools.output.table import format_table
     from lira.tools.report import RECORD, write_report
@@ -190,6 +191,7 @@ def conclude(folder: Path, passed: bool | None) -> int:
     print(f"\n{format_table(COLUMNS, [lap_cells(lap) for lap in recorded.laps])}\n")
     if recorded.verdict is not None:
         print(f"{recorded.verdict.words}.")
-    print(f"report: {write_report(folder)}")
-    print(f"go on another day: lira teach --run {shlex.quote(str(folder))}")
+    print(f"report: {write_report(folder, shown_as)}")
+    if not shown_as:
+        print(f"go on another day: lira teach --run {shlex.quote(str(folder))}")
     return 1 if passed is False else 0
