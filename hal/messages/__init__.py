@@ -1,5 +1,6 @@
 """The values that cross modules. Messages that mirror ROS keep its field names."""
 
+from lira.hal.messages.description import CameraInfo, Text, Transform, Transforms
 from lira.hal.messages.learning import (
     Call,
     CallName,
@@ -54,6 +55,7 @@ from lira.hal.messages.values import (
     Range,
     Request,
     Seed,
+    Spread,
     WordArray,
 )
 
@@ -70,6 +72,7 @@ __all__ = [
     "ByteArray",
     "Call",
     "CallName",
+    "CameraInfo",
     "Clock",
     "Command",
     "CompressedImage",
@@ -102,7 +105,11 @@ __all__ = [
     "Seed",
     "SessionState",
     "Source",
+    "Spread",
     "Stage",
+    "Text",
+    "Transform",
+    "Transforms",
     "Twist",
     "TwistStamped",
     "WordArray",

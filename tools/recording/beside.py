@@ -1,5 +1,6 @@
 """A recorder beside a run: started with it, ended with it, and never what it fails for."""
 
+import argparse
 import contextlib
 from collections.abc import Callable, Iterator
 from importlib.util import find_spec
@@ -16,16 +17,19 @@ Say = Callable[[str], None]
 
 
 @contextlib.contextmanager
-def recorder_beside(name: str, endpoint: str, run: Path, say: Say) -> Iterator[Callable[[], None]]:
-    """Record the robot `name` into the folder of a run. Yields what waits until everything is heard.
+def recorder_beside(args: argparse.Namespace, run: Path, say: Say) -> Iterator[Callable[[], None]]:
+    """Record the robot at hand into the folder of a run, unless told not to. Yields what waits until all is heard.
 
-    A run on which something depends goes on without a recording, and says so.
+    A run goes on without its recording, and says so.
     """
+    if args.no_record:
+        yield lambda: None
+        return
     if find_spec("mcap") is None:
         say(f"not recorded: {MissingExtraError('mcap', 'record')}")
         yield lambda: None
         return
-    words = ["record", "--name", name, "--connect", endpoint, "--out", str(new_folder(run))]
+    words = ["record", "--name", args.name, "--connect", args.connect, "--out", str(new_folder(run))]
     with ChildProcess("the recorder", lira_command(*words), run / LOG) as recorder:
 
         def wait() -> None:

@@ -47,6 +47,11 @@ class Head(msgspec.Struct, frozen=True):
         """Name of the twin's world, "" on a floor."""
         return _World.name_in(self.info.arena)
 
+    @property
+    def began_s(self) -> float:
+        """When it began, on the robot's clock."""
+        return self.to_robot_s(self.began_ns)
+
     def to_robot_s(self, time_ns: int) -> float:
         """Return a time of the file on the robot's clock."""
         return (time_ns - self.offset_ns) / 1e9

@@ -21,6 +21,7 @@ from lira.tools.live.hand import Hand
 from lira.tools.runs.progress import Publish
 
 FLOOR = "floor"  # the world of a robot that is in none of ours
+PAUSED = "paused: P on a screen, or square on the pad, begins"
 NO_TWIN = "Here, a person teaches (--teacher none), and a policy drives without --unseen."
 
 

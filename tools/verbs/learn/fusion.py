@@ -13,10 +13,8 @@ examples:
 """
 
 import argparse
-import contextlib
 import shlex
 import sys
-from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -29,6 +27,7 @@ from lira.tools.options import (
     add_expert,
     add_layout,
     add_pair,
+    add_paused,
     add_protocol,
     add_record,
     add_seed,
@@ -78,6 +77,7 @@ def add_teaching(parser: argparse.ArgumentParser) -> None:
         default="none",
         help="who helps: a person with a gamepad (none), or on a twin a script with few, no or many human faults",
     )
+    add_paused(parser)
     add_arena(parser)
     add("--train-laps", type=natural, default=12, help=f"scripted teacher: give up after so many laps {DEFAULT}")
     add_protocol(parser)
@@ -101,31 +101,13 @@ def run(args: argparse.Namespace) -> int:
         raise ConfigError(f"by the method '{args.method}' nobody learns", "Show it on a twin with --teacher perfect.")
     torch.set_num_threads(1)
     one_thread()
-    with recorder_of(args, plan) as wait_for_it, connect(args.connect, args.name, close_s=CLOSE_S) as robot:
-        wait_for_it()
+    with connect(args.connect, args.name, close_s=CLOSE_S) as robot:
         if args.teacher == "none":
             return learn_by_hand(args, plan, robot)
         from lira.tools.runs.on_twin import teach
         from lira.tools.runs.reach import reports_of, say
 
         return teach(args, plan, robot, reports_of(robot), say)
-
-
-@contextlib.contextmanager
-def recorder_of(args: argparse.Namespace, plan: "Plan") -> Iterator[Callable[[], None]]:
-    """Record the run unless told not to; yields what waits for the recorder."""
-    from lira.tools.recording.beside import recorder_beside
-    from lira.tools.runs.folder import check_fresh
-    from lira.tools.runs.reach import say
-
-    assert plan.folder is not None
-    if args.teacher != "none":
-        check_fresh(plan.folder)
-    if args.no_record:
-        yield lambda: None
-        return
-    with recorder_beside(args.name, args.connect, plan.folder, say) as wait:
-        yield wait
 
 
 def learn_by_hand(args: argparse.Namespace, plan: "Plan", robot: "RemoteRobot") -> int:
