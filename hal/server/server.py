@@ -80,7 +80,7 @@ class HalServer:
         try:
             sensors = SensorPublisher(self._bus, self._robot.profile, self._calibration, lockstep=True)
             loop = LockstepLoop(self._robot, self._bus, sensors, self._info_service(), self._arena)
-            sensors.describe(self._robot.now())
+            sensors.describe(self._robot.now(), arena=self._arena is not None)
             self._ready()
             loop.run(stop)
         finally:
@@ -98,7 +98,7 @@ class HalServer:
             self._robot.open()
             try:
                 self._bus.count_from_1970(self._robot.now)
-                publisher.describe(self._robot.now())
+                publisher.describe(self._robot.now(), arena=self._arena is not None)
                 loop = SensorLoop(self._robot, self._bus, publisher, pictures, self._info_service(), self._arena)
                 opened.set()
                 loop.run(wheels_still)
