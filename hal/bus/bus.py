@@ -14,7 +14,7 @@ from typing import Any, TypeVar
 import zenoh
 
 from lira.hal.bus.access_log import Refusals
-from lira.hal.bus.attachment import Attachment
+from lira.hal.bus.attachment import attach
 from lira.hal.bus.boundary import Boundary
 from lira.hal.bus.connection import Connection, Declared
 from lira.hal.bus.endpoint import DEFAULT_ROBOT, check_address, check_name, is_loopback
@@ -116,8 +116,9 @@ class Bus:
     def publisher(self, topic: Topic[M], qos: Qos | None = None) -> Publisher[M]:
         """Declare a publisher; `qos` replaces the table's."""
         key = self._key(self._own(topic).key)
-        attach = partial(_attach, self.epoch, self._counts.setdefault(key, itertools.count(1)), self._time_base)
-        return Publisher(self._connection, key, topic, qos or topic.qos, attach, self._time_base)
+        base = self._time_base
+        beside = partial(attach, self.epoch, self._counts.setdefault(key, itertools.count(1)), base)
+        return Publisher(self._connection, key, topic, qos or topic.qos, beside, base)
 
     def put_raw(self, topic: Topic[Any], payload: bytes, attachment: bytes | None = None) -> None:
         """Send bytes as they are: for relays, recorders and tests of what a bus has to bear."""
@@ -193,9 +194,13 @@ class Bus:
 
     def short_peers(self) -> int:
         """How many peers have less than two links, so that their UDP does not get through. Watchers need but one."""
+        return len(self.short_sessions())
+
+    def short_sessions(self) -> frozenset[str]:
+        """The ids of these peers' sessions."""
         session = self._session
         counts = Counter(str(link.zid) for link in session.info.links())
-        return sum(counts[str(zid)] < LINKS_PER_PEER for zid in session.info.peers_zid())
+        return frozenset(zid for zid in map(str, session.info.peers_zid()) if counts[zid] < LINKS_PER_PEER)
 
     def close(self, timeout_s: float = CLOSE_S) -> bool:
         """Close the session; False if a dead link kept it from closing in time. May be called twice."""
@@ -229,17 +234,3 @@ class Bus:
 
     def _key(self, key: str) -> str:
         return f"{self._prefix}/{key}" if self._prefix else key
-
-
-def _attach(
-    epoch: int,
-    count: Iterator[int],
-    base: TimeBase,
-    time_s: float,
-    seq: int | None,
-    answers: int,
-    *,
-    released: bool,
-) -> bytes:
-    number = next(count) if seq is None else seq
-    return Attachment(epoch, number, round(time_s * 1e9) + base.offset_ns, answers, released).to_bytes()

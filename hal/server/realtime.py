@@ -16,6 +16,7 @@ from lira.hal.messages import Applied, Observation, Reason
 from lira.hal.port import Arena
 from lira.hal.safety.governed import GovernedRobot
 from lira.hal.server.command_reader import Inlet
+from lira.hal.server.command_watch import CommandWatch
 from lira.hal.server.info_service import InfoService
 from lira.hal.server.sensor_publisher import SensorPublisher
 
@@ -32,9 +33,9 @@ UNTOLD = 16  # what was applied and could not be told yet, at most
 class CommandLoop:
     """Moves the wheels: law 1 stands on this page. Nothing here waits for the bus: `events` tells what was applied."""
 
-    def __init__(self, robot: GovernedRobot, bus: Bus, events: "AppliedLoop") -> None:
+    def __init__(self, robot: GovernedRobot, bus: Bus, events: "AppliedLoop", watch: CommandWatch) -> None:
         self._robot = robot
-        self._inlet = Inlet(bus)
+        self._inlet = Inlet(bus, robot.profile.control, watch)
         self._boundary = bus.boundary
         self._events = events
 

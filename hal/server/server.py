@@ -16,6 +16,7 @@ from lira.hal.errors import BusError
 from lira.hal.messages import CameraInfo
 from lira.hal.port import Arena
 from lira.hal.safety.governed import GovernedRobot
+from lira.hal.server.command_watch import CommandWatch
 from lira.hal.server.diagnostics import Reporter
 from lira.hal.server.estop_service import EstopService
 from lira.hal.server.info_service import InfoService
@@ -109,13 +110,14 @@ class HalServer:
         while not opened.wait(LOOK_S) and not stop.is_set():
             pass
         applied = AppliedLoop(self._robot, self._bus)
-        commands = CommandLoop(self._robot, self._bus, applied)
+        watch = CommandWatch()
+        commands = CommandLoop(self._robot, self._bus, applied, watch)
         wheels = crew.start("commands", lambda: commands.run(stop))
         crew.start("applied", lambda: applied.run(stop))
         crew.start("pictures", lambda: pictures.run(stop))
         estop = EstopService(self._robot, self._bus)
         crew.start("estop", lambda: estop.run(stop))
-        reporter = Reporter(self._robot, self._bus)
+        reporter = Reporter(self._robot, self._bus, watch)
         crew.start("diagnostics", lambda: reporter.run(stop))
         try:
             if opened.is_set():
