@@ -26,6 +26,7 @@ GROUPS = {
         "twin": "the digital twin: a simulated ROSbot on the bus",
         "robot": "the physical ROSbot: opens its lidar, camera and base, and puts it on the bus",
         "ros2": "a robot that runs ROS 2: puts it on the bus through zenoh-bridge-ros2dds",
+        "msgs": "write the ROS 2 package with our message types, for colcon build",
         "calibrate": "measure how far the base really goes, and write it into its settings",
         "parity": "the same motions on two robots, and where they differ",
     },
