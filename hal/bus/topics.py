@@ -23,6 +23,7 @@ from lira.hal.messages import (
     Joy,
     JoyFeedback,
     LaserScan,
+    MethodCalls,
     Odometry,
     OperatorAnswer,
     OperatorRequest,
@@ -64,6 +65,7 @@ IN_LOCKSTEP = Qos(Reliability.RELIABLE, Priority.DATA, express=True, wait=True)
 PICTURE_BYTES = 2 * 2**20
 SCAN_BYTES = 160 * 2**10  # of `hal.bounds.MOST_BEAMS` beams with intensities
 REPORT_BYTES = 64 * 2**10
+CALLS_BYTES = 256 * 2**10  # what a method saw in a step, or some labels from before
 SMALL_BYTES = 2 * 2**10  # numbers, a header and a few short texts
 COMMAND_BYTES = 256  # a TwistStamped whose frame has a name
 ATTACHMENT_BYTES = 256  # ours and those of ROS peers
@@ -117,6 +119,7 @@ JOY_FEEDBACK = Topic("joy/feedback", JoyFeedback, 10.0, 0.2, REPORT)
 OPERATOR = Topic("operator", OperatorRequest, 5.0, 1.0, REPORT)  # asked later than this counts for nothing
 OPERATOR_ANSWER = Topic("operator/answer", OperatorAnswer, 1.0, 3.0, REPORT, REPORT_BYTES)
 DECISION = Topic("lira/decision", Decision, 5.0, 1.0, REPORT, REPORT_BYTES)
+METHOD = Topic("lira/method", MethodCalls, 5.0, 1.0, REPORT, CALLS_BYTES)
 SESSION = Topic("lira/session", SessionState, 1.0, 3.0, REPORT, REPORT_BYTES)
 DIAGNOSTICS = Topic("diagnostics", DiagnosticArray, 1.0, 3.0, REPORT, REPORT_BYTES)
 SIM_STATE = Topic("sim/state", CourseState, 20.0, 0.3, SENSOR)
@@ -144,6 +147,7 @@ TOPICS: tuple[Topic[Any], ...] = (
     OPERATOR,
     OPERATOR_ANSWER,
     DECISION,
+    METHOD,
     SESSION,
     DIAGNOSTICS,
     SIM_STATE,
@@ -159,6 +163,7 @@ FROM_OPERATORS: tuple[Topic[Any], ...] = (
     OPERATOR,
     OPERATOR_ANSWER,
     DECISION,
+    METHOD,
     SESSION,
     DIAGNOSTICS,
 )
