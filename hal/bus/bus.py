@@ -7,7 +7,7 @@ import itertools
 import secrets
 import time
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from functools import partial
 from typing import Any, TypeVar
 
@@ -22,9 +22,10 @@ from lira.hal.bus.expiry import Reminder
 from lira.hal.bus.keys import Keys, keys_from_environment, load_keys
 from lira.hal.bus.publisher import Publisher
 from lira.hal.bus.questions import Answer, Questions, ask_once
-from lira.hal.bus.reader import Reader
+from lira.hal.bus.reader import Reader, Tap
 from lira.hal.bus.topics import COMMANDS, Qos, Topic, named
 from lira.hal.bus.zenoh_session import open_session
+from lira.hal.clock import TimeBase, unix_offset_s
 from lira.hal.errors import BusError, ConfigError
 
 M = TypeVar("M")
@@ -72,6 +73,7 @@ class Bus:
         self.epoch = secrets.randbits(64)
         self.refusals = refusals or Refusals()
         self.boundary = Boundary()
+        self._time_base = TimeBase()
         self._counts: dict[str, Iterator[int]] = {}  # what was sent, by key: they grow whoever sends
         keys = keys or keys_from_environment()
         self.encrypted = keys is not None
@@ -99,11 +101,20 @@ class Bus:
             self.close()
             raise BusError(f"cannot open the bus at {connect}", "Check the address, and that the robot runs.")
 
+    def count_from_1970(self, now: Callable[[], float]) -> None:
+        """Tell and hear all times on the clock `now` as seconds since 1970; measured once, now."""
+        self._time_base.offset_s = unix_offset_s(now)
+
+    @property
+    def offset_s(self) -> float:
+        """What times on the bus are ahead of those of this process."""
+        return self._time_base.offset_s
+
     def publisher(self, topic: Topic[M], qos: Qos | None = None) -> Publisher[M]:
         """Declare a publisher; `qos` replaces the table's."""
         key = self._key(self._own(topic).key)
-        attach = partial(_attach, self.epoch, self._counts.setdefault(key, itertools.count(1)))
-        return Publisher(self._connection, key, topic, qos or topic.qos, attach)
+        attach = partial(_attach, self.epoch, self._counts.setdefault(key, itertools.count(1)), self._time_base)
+        return Publisher(self._connection, key, topic, qos or topic.qos, attach, self._time_base)
 
     def put_raw(self, topic: Topic[Any], payload: bytes, attachment: bytes | None = None) -> None:
         """Send bytes as they are: for relays, recorders and tests of what a bus has to bear."""
@@ -117,7 +128,11 @@ class Bus:
 
     def reader(self, topic: Topic[M], depth: int = 1) -> Reader[M]:
         """Declare a reader that keeps the newest `depth` messages between polls."""
-        return Reader(self._connection, self._key(topic.key), topic, depth, self.boundary)
+        return Reader(self._connection, self._key(topic.key), topic, depth, self.boundary, self._time_base)
+
+    def tap(self) -> Tap:
+        """Hear everything that this session may hear, as it came."""
+        return Tap(self._connection, self._prefix, self.boundary)
 
     def questions(self, key: str) -> Questions:
         """Answer queries on a key."""
@@ -198,6 +213,15 @@ class Bus:
         return f"{self._prefix}/{key}" if self._prefix else key
 
 
-def _attach(epoch: int, count: Iterator[int], time_s: float, seq: int | None, answers: int, *, released: bool) -> bytes:
+def _attach(
+    epoch: int,
+    count: Iterator[int],
+    base: TimeBase,
+    time_s: float,
+    seq: int | None,
+    answers: int,
+    *,
+    released: bool,
+) -> bytes:
     number = next(count) if seq is None else seq
-    return Attachment(epoch, number, round(time_s * 1e9), answers, released).to_bytes()
+    return Attachment(epoch, number, round(time_s * 1e9) + base.offset_ns, answers, released).to_bytes()

@@ -44,6 +44,8 @@ GROUPS = {
         "world": "draw a world from above and as the camera sees it",
     },
     ("records", "Records"): {
+        "record": "record everything on a robot's bus, for later and for others' tools",
+        "info": "what a recording holds",
         "report": "make the HTML page of a recorded run",
     },
     ("operation", "Operation"): {
