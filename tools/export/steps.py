@@ -12,13 +12,13 @@ from dataclasses import dataclass, replace
 from typing import Any, Protocol
 
 from lira.hal.bus.sensors import SENSORS, Stamped, observation_of
-from lira.hal.bus.topics import APPLIED, DECISION
+from lira.hal.bus.topics import APPLIED, DECISION, Topic
 from lira.hal.messages import Applied, Decision, Driver, Observation, Phase
 
 KEPT = 32  # of each sensor: a decision is told a period after what it was made on
 BREAK_S = 2.0  # a longer silence is the end of an episode
 _SENSORS = {sensor.topic.key: sensor for sensor in SENSORS}
-TOPICS = (DECISION, APPLIED, *(sensor.topic for sensor in SENSORS))  # what steps are made of
+TOPICS: tuple[Topic[Any], ...] = (DECISION, APPLIED, *(sensor.topic for sensor in SENSORS))  # what steps are made of
 
 
 class Heard(Protocol):
