@@ -40,6 +40,7 @@ class Stage(StrEnum):
     DEMONSTRATION = "demonstration"
     TEACHING = "teaching"
     PROVING = "proving"  # the novice alone; a twin tells how it went
+    EXAM = "exam"  # the same on layouts that it has not seen, in a twin of its own
     JUDGING = "judging"  # the novice alone; the person says how it went
     VERDICT = "verdict"  # stop, or go on?
     OVER = "over"
@@ -49,10 +50,10 @@ class Stage(StrEnum):
 class SessionState:
     """How a person's session of teaching goes (`lira/session`): what to do next, and whether it is good already.
 
-    `person` is who teaches and `layout` the twin's, as it is now. Counts go on from day to day; `laps` (of teaching),
-    `passed`, `collisions` and `lost` are of today. `alone` is the share of steps since the demonstration in which no
+    `person` is who teaches and `layout` the twin's, as it is now. Counts go on from day to day: `laps` (of teaching),
+    `passed`, `collisions` and `lost` too. `alone` is the share of steps since the demonstration in which no
     person drove, `curve` the same of each lap. Of `shown` proving laps the novice has passed `proven`. `words` is the
-    newest verdict.
+    newest verdict, and `converged` whether it is that the novice passed.
     """
 
     stamp_s: float
@@ -71,6 +72,7 @@ class SessionState:
     proven: int = 0
     shown: int = 0
     words: str = ""
+    converged: bool = False
 
 
 @dataclass(frozen=True, slots=True)

@@ -32,7 +32,8 @@ class HalServer:
     """Serves `robot` until told to stop. It opens and closes the robot; the bus stays the caller's.
 
     `arena` is the twin behind the robot, if there is one, and `arena_info` JSON about its world for whoever asks.
-    `calibration` is its camera's, None for the profile's pinhole. `ready`, if given, is called once the robot answers.
+    `calibration` is its camera's, None for the profile's pinhole. `ready`, if given, is called once the robot answers;
+    in real time `alive` over and over by the thread that moves the wheels, so it must not wait.
     """
 
     def __init__(
@@ -45,6 +46,7 @@ class HalServer:
         lockstep: bool = False,
         calibration: CameraInfo | None = None,
         ready: Callable[[], None] = lambda: None,
+        alive: Callable[[], None] = lambda: None,
     ) -> None:
         self._robot = robot
         self._bus = bus
@@ -52,6 +54,7 @@ class HalServer:
         self._info = Info(robot.profile, LOCKSTEP if lockstep else REALTIME, bus.epoch, msgspec.Raw(arena_info))
         self._calibration = calibration
         self._ready = ready
+        self._alive = alive
 
     def run(self, stop: threading.Event) -> None:
         """Serve until `stop` is set; sets it if a thread of the server fails, and raises what it failed with.
@@ -109,7 +112,7 @@ class HalServer:
         while not opened.wait(LOOK_S) and not stop.is_set():
             pass
         applied = AppliedLoop(self._robot, self._bus)
-        commands = CommandLoop(self._robot, self._bus, applied)
+        commands = CommandLoop(self._robot, self._bus, applied, self._alive)
         wheels = crew.start("commands", lambda: commands.run(stop))
         crew.start("applied", lambda: applied.run(stop))
         crew.start("pictures", lambda: pictures.run(stop))

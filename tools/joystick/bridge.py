@@ -15,7 +15,7 @@ from lira.tools.joystick.client import TeleopClient
 from lira.tools.joystick.deadman import Hand, Order, State
 from lira.tools.joystick.freeze import FreezeWatch
 from lira.tools.joystick.known_pads import PadMemory
-from lira.tools.joystick.mapping import Mapping, load_mapping
+from lira.tools.joystick.pads.mapping import Mapping, load_mapping
 from lira.tools.joystick.requests import RequestButtons
 from lira.tools.joystick.rumble import PATTERNS, TAKEN, Rumble, pattern_of
 from lira.tools.operator.situation import Urgency
@@ -107,10 +107,14 @@ class Bridge:
         """How the dead-man is."""
         return self._hand.state
 
-    def run(self, stop: threading.Event) -> None:
-        """Go on until `stop` is set; then let the robot stand if a hand was on the controls."""
+    def run(self, stop: threading.Event, alive: Callable[[], None] = lambda: None) -> None:
+        """Go on until `stop` is set; then let the robot stand if a hand was on the controls.
+
+        `alive` is called with every turn.
+        """
         try:
             while not stop.is_set():
+                alive()
                 self._step()
         finally:
             if self._sent.action is not None:

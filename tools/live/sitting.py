@@ -15,8 +15,11 @@ from lira.hal.bus.topics import DECISION, SESSION
 from lira.hal.client.remote import RemoteRobot
 from lira.sim_backend.world import World
 from lira.tools.launch.lifetime import saving, stop_or_interrupt
+from lira.tools.live.board import Board
 from lira.tools.live.classroom import Classroom
-from lira.tools.live.session import LiveSession, Rules
+from lira.tools.live.lap_driver import LapDriver
+from lira.tools.live.rules import Rules
+from lira.tools.live.session import LiveSession
 from lira.tools.operator.voice import explain
 from lira.tools.runs.course import Course
 from lira.tools.runs.folder import LABELS, RECORD, in_the_log
@@ -39,8 +42,7 @@ def sit(args: argparse.Namespace, plan: Plan, robot: RemoteRobot, rules: Rules, 
     arena = robot.arena
     course = None
     if world is not None:
-        unseen = range(plan.layout + 1, plan.layout + 1 + plan.unseen)
-        course = Course(robot.profile, world, plan.layout, plan.preset.syllabus, plan.laps, unseen=unseen)
+        course = Course(robot.profile, world, plan.layout)
     name = FLOOR if world is None else world.name
     folder = plan.folder
     assert folder is not None
@@ -55,23 +57,22 @@ def sit(args: argparse.Namespace, plan: Plan, robot: RemoteRobot, rules: Rules, 
         room.go_on(journal.ledger)
         hand = stack.enter_context(hand_of(args))
         truth = None if arena is None else robot.link.state
-        session = LiveSession(
-            *(robot, arena, course, ControlLoop(robot, truth=truth), room, journal, hand, rules, say),
-            publish=lambda state: sessions.put(state, robot.now()),
-            explain=explain,
+        loop = ControlLoop(robot, truth=truth)
+        board = Board(
+            rules.person, room.before, journal.ledger, robot.now, lambda state: sessions.put(state, robot.now()), say
         )
+        driver = LapDriver(robot, arena, loop, room, journal, hand, rules, board, say, explain)
+        session = LiveSession(driver, course, room, journal, rules, say)
         stack.enter_context(saving(room.snapshot, say))
-        session.stop = stack.enter_context(stop_or_interrupt())
+        driver.stop = stack.enter_context(stop_or_interrupt())
         line = stack.enter_context(request_line(robot, args))
-        session.service = stack.enter_context(
+        driver.service = stack.enter_context(
             contextlib.closing(
-                OperatorService(
-                    line, session.loop, room.method, journal, say, snapshot=room.snapshot, session=session.take
-                )
+                OperatorService(line, loop, room.method, journal, say, snapshot=room.snapshot, session=session.take)
             )
         )
-        session.loop.arm()
-        if room.before is not None:
+        loop.arm()
+        if room.before.newest is not None:
             say(f"goes on with {room.method.novice.stored} labels from before")
         session.run()
         aside = in_the_log(folder / LABELS, room.method.novice.set_aside())
