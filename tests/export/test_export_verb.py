@@ -1,6 +1,8 @@
 """`lira export` of a recording on disk, with and without the log of labels beside it."""
 
 import csv
+import subprocess
+import sys
 
 import h5py
 import msgspec
@@ -90,3 +92,13 @@ def test_a_recording_in_which_nobody_decides_is_told(tmp_path, capsys):
     record(tmp_path / "run", [])
     assert main(["export", "csv", str(tmp_path / "run"), str(tmp_path / "run.csv")]) == 2
     assert "nobody decided anything" in capsys.readouterr().err
+
+
+def test_nobody_needs_pytorch_for_it(run, tmp_path):
+    """Who exports a run on a laptop without the learner has neither it nor what comes with it."""
+    words = ["export", "lerobot", str(run), str(tmp_path / "set")]
+    taken = ["import", str(tmp_path / "set"), "--run", str(tmp_path / "warm")]
+    absent = f"import sys; sys.modules.update(dict.fromkeys({['torch', 'safetensors', 'pybullet']}))"
+    code = f"{absent}; from lira.tools.cli import main; sys.exit(main({words}) or main({taken}))"
+    done = subprocess.run([sys.executable, "-c", code], check=False, capture_output=True, text=True, timeout=60)
+    assert done.returncode == 0, done.stderr

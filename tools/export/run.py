@@ -11,7 +11,7 @@ from lira.tools.export.columns import Table, tables_of
 from lira.tools.export.steps import TOPICS, ExportStep, Heard, episodes_of, steps_of
 from lira.tools.recording.layout import Head
 from lira.tools.recording.reader import Recording
-from lira.tools.runs.folder import LABELS
+from lira.tools.runs.names import LABELS
 
 
 class RecordedRun(NamedTuple):

@@ -42,7 +42,7 @@ def run(args: argparse.Namespace) -> int:
     """Read it, and append what was shown to the run's labels."""
     from lira.hal.profile import load_profile
     from lira.tools.export.demonstrations import keep
-    from lira.tools.runs.folder import LABELS
+    from lira.tools.runs.names import LABELS
 
     profile, path = load_profile(args.profile), args.run / LABELS
     if (args.file / "meta").is_dir():
