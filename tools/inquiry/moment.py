@@ -50,6 +50,7 @@ class Moment:
     novice: State | None = None
     moved: Recorded | None = None
     result: Recorded | None = None
+    live: bool = False
 
     def message(self, topic: Topic[Any]) -> Any:
         """The newest of a topic, None if there was none."""
@@ -124,6 +125,7 @@ def moment_now(bus: Bus, head: Head, heard_s: float) -> Moment:
             found.append(Recorded(raw.key, raw.ros_type, raw.payload, raw.attachment, now_ns, now_ns, head))
         time.sleep(0.01)
     moment = gather(head, found, head.to_robot_s(time.time_ns()))
+    moment.live = True
     _learn_of(moment, _calls(each for each in found if each.key == METHOD.key))
     return moment
 

@@ -67,7 +67,7 @@ def _place(moment: Moment) -> str:
     decision: Decision | None = moment.message(DECISION)
     place = "" if decision is None else f", {PHASES[decision.phase]} {decision.lap}"
     method = "" if moment.recipe is None else f", method '{moment.recipe.preset.name}'"
-    return f"at {moment.time_s:.1f} s{place}{method}"
+    return f"{'now' if moment.live else f'at {moment.time_s:.1f} s'}{place}{method}"
 
 
 def _line(name: str, text: Iterator[str]) -> list[str]:
@@ -155,7 +155,7 @@ def _wheels(moment: Moment) -> Iterator[str]:
         yield "nothing is known of what they got"
         return
     yield from _applied(applied)
-    if moment.result is not None and moment.result is not moment.newest.get(APPLIED.key):
+    if moment.result is not None and moment.result.arrived_s > moment.at_s:
         later_s = moment.result.arrived_s - moment.at_s
         first, *rest = _applied(moment.result.message)
         yield f"this decision reached them {later_s:.2f} s later: {first}"
