@@ -13,6 +13,7 @@ import pytest
 from lira.hal.errors import ConfigError
 from lira.tools.cli import EXTRAS, Parser, main
 from lira.tools.lifecycle import folder as folders
+from lira.tools.lifecycle.arguments import Ports, add_setup, setup_of
 from lira.tools.lifecycle.folder import AlreadyUpError, StateFolder
 from lira.tools.lifecycle.line import WINDOW_S, Rate
 from lira.tools.lifecycle.logs import Follower, last_lines
@@ -22,7 +23,6 @@ from lira.tools.lifecycle.setup import Setup, endpoint_of, run_folder
 from lira.tools.lifecycle.status import as_object, as_text, look
 from lira.tools.lifecycle.table import PROCESSES, SETS, Host, chosen, rows
 from lira.tools.verbs import VERBS, module_of
-from lira.tools.verbs.operation import up
 
 SETUP = Setup(
     processes=tuple(process.name for process in PROCESSES),
@@ -62,7 +62,6 @@ def test_the_packages_of_a_row_have_an_extra_that_brings_them():
 
 def test_sets_name_rows_of_the_laptop_and_the_robot_comes_first():
     by_name = {process.name: process for process in PROCESSES}
-    assert list(SETS) == list(up.SETS)
     for names in SETS.values():
         assert all(by_name[name].host is Host.LAPTOP for name in names)
         assert by_name[names[0]].is_robot
@@ -101,8 +100,8 @@ def test_what_is_learned_is_kept_by_method_and_place():
 
 def asked(*words):
     parser = argparse.ArgumentParser()
-    up.add_arguments(parser)
-    return up.setup_of(parser.parse_args(words))
+    add_setup(parser)
+    return setup_of(parser.parse_args(words), Ports())
 
 
 def test_a_twin_is_the_usual_and_of_the_worlds_experiment():

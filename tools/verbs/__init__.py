@@ -53,6 +53,7 @@ GROUPS = {
         "status": "what is up: processes, rates, ages, link, who drives",
         "logs": "what the processes that are up have written",
         "down": "stop all that is up, drivers first and the robot last",
+        "deploy": "run them from the start of the machine: systemd units, keys and rules, here or on the robot",
         "keys": "make the keys that say who may drive a robot, and encrypt the bus",
     },
     ("checks", "Checks"): {
