@@ -23,7 +23,7 @@ from lira.tools.deploy import packages, units
 from lira.tools.deploy.plan import SECRET, File, Plan, removal
 from lira.tools.deploy.plans import for_laptop, for_robot
 from lira.tools.deploy.target import Facts, Target
-from lira.tools.joystick.rules import rules_text
+from lira.tools.joystick.device.rules import rules_text
 from lira.tools.launch.processes import ProcessError
 from lira.tools.lifecycle.setup import Setup
 from lira.tools.lifecycle.table import PROCESSES, SETS, rows

@@ -11,8 +11,8 @@ from lira.hal.errors import ConfigError
 from lira.tools.deploy import packages, units
 from lira.tools.deploy.plan import SECRET, File, Plan
 from lira.tools.deploy.target import Facts
-from lira.tools.joystick.rules import PLACE as PAD_PLACE
-from lira.tools.joystick.rules import rules_text
+from lira.tools.joystick.device.rules import PLACE as PAD_PLACE
+from lira.tools.joystick.device.rules import rules_text
 from lira.tools.lifecycle.setup import Setup
 from lira.tools.lifecycle.table import rows
 
