@@ -25,6 +25,7 @@ from lira.tools.deploy.plans import for_laptop, for_robot
 from lira.tools.deploy.target import Facts, Target
 from lira.tools.joystick.device.rules import rules_text
 from lira.tools.launch.processes import ProcessError
+from lira.tools.lifecycle.services import unit_name
 from lira.tools.lifecycle.setup import Setup
 from lira.tools.lifecycle.table import PROCESSES, SETS, rows
 from lira.tools.verbs import VERBS
@@ -49,7 +50,7 @@ def text_of(plan, name):
 
 def test_there_is_a_unit_of_each_process_and_a_target_that_wants_them_all():
     plan = laptop()
-    names = {units.unit_name("rosbot", name) for name in SETS["teach"]}
+    names = {unit_name("rosbot", name) for name in SETS["teach"]}
     assert {Path(file.path).name for file in plan.files if file.path.endswith(".service")} == names
     wants = next(line for line in text_of(plan, ".target").splitlines() if line.startswith("Wants="))
     assert set(wants.removeprefix("Wants=").split()) == names

@@ -5,11 +5,16 @@ import shlex
 import tarfile
 from dataclasses import dataclass
 
-from lira.tools.deploy.units import target_name, unit_name
+from lira.tools.lifecycle.services import config_folder, target_name, unit_name
 
 SECRET = 0o600
 PLAIN = 0o644
 MOST_SHOWN = 2000
+
+
+def manifest_of(name: str) -> str:
+    """Where it is written down what was put there, a path a line; a folder ends with a slash."""
+    return f"{config_folder(name)}/deployed"
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,8 +53,8 @@ class Plan:
 
     @property
     def manifest(self) -> str:
-        """Where it is written down what was put there, a path a line; a folder ends with a slash."""
-        return f".config/lira/{self.name}/deployed"
+        """Where it is written down what was put there."""
+        return manifest_of(self.name)
 
     def archive(self) -> bytes:
         """All files with the list of them, as a tar archive."""
@@ -109,7 +114,7 @@ def _is_inside(path: str) -> bool:
 
 def removal(name: str) -> str:
     """What is run to undo a deployment: by its own list, and nothing outside the home folder."""
-    manifest = shlex.quote(f".config/lira/{name}/deployed")
+    manifest, settings = shlex.quote(manifest_of(name)), config_folder(name)
     return f"""set -eu
 cd "$HOME"
 [ -f {manifest} ] || {{ echo "nothing was deployed for '{name}' there"; exit 0; }}
@@ -123,7 +128,7 @@ while IFS= read -r path; do
   esac
 done < {manifest}
 rm -f -- {manifest}
-for folder in .config/lira/{name}/keys .config/lira/{name} .local/share/lira/{name}/wheels .local/share/lira/{name}; do
+for folder in {settings}/keys {settings} .local/share/lira/{name}/wheels .local/share/lira/{name}; do
   rmdir -- "$folder" 2>/dev/null || true
 done
 systemctl --user daemon-reload >/dev/null 2>&1 || true

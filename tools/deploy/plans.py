@@ -13,11 +13,11 @@ from lira.tools.deploy.plan import SECRET, File, Plan
 from lira.tools.deploy.target import Facts
 from lira.tools.joystick.device.rules import PLACE as PAD_PLACE
 from lira.tools.joystick.device.rules import rules_text
+from lira.tools.lifecycle.services import SETUP, config_folder, target_name, unit_name
 from lira.tools.lifecycle.setup import Setup
 from lira.tools.lifecycle.table import rows
 
 ROSBOT_PLACE = "/etc/udev/rules.d/99-lira-rosbot.rules"
-SETUP = "setup.json"
 
 
 def for_laptop(setup: Setup, facts: Facts, python: str, folder: Path, keys: Path | None = None) -> Plan:
@@ -25,7 +25,7 @@ def for_laptop(setup: Setup, facts: Facts, python: str, folder: Path, keys: Path
     files = [*_units(setup, facts, python, str(folder)), *_settings(setup, facts, keys)]
     notes: tuple[str, ...] = ()
     if "pad" in setup.processes:
-        files.append(File(f"{_config(setup)}/{Path(PAD_PLACE).name}", rules_text().encode()))
+        files.append(File(f"{config_folder(setup.name)}/{Path(PAD_PLACE).name}", rules_text().encode()))
         notes = _udev(setup, PAD_PLACE)
     return Plan(setup.name, setup.processes, tuple(files), notes=notes)
 
@@ -37,7 +37,7 @@ def for_robot(setup: Setup, facts: Facts, brought: Sequence[File], keys: Path | 
     setup, taken = _with_files(setup, facts)
     rules = (resources.files("lira.tools.deploy") / Path(ROSBOT_PLACE).name).read_bytes()
     files = [*_units(setup, facts, python, facts.home), *_settings(setup, facts, keys), *taken, *brought]
-    files.append(File(f"{_config(setup)}/{Path(ROSBOT_PLACE).name}", rules))
+    files.append(File(f"{config_folder(setup.name)}/{Path(ROSBOT_PLACE).name}", rules))
     groups = "sudo usermod -aG dialout,video $USER     # then log in again"
     return Plan(
         name,
@@ -49,29 +49,25 @@ def for_robot(setup: Setup, facts: Facts, brought: Sequence[File], keys: Path | 
     )
 
 
-def _config(setup: Setup) -> str:
-    return f".config/lira/{setup.name}"
-
-
 def _units(setup: Setup, facts: Facts, python: str, folder: str) -> list[File]:
     home = ".config/systemd/user"
-    files = [File(f"{home}/{units.target_name(setup.name)}", units.target(setup).encode())]
+    files = [File(f"{home}/{target_name(setup.name)}", units.target(setup).encode())]
     for process in rows(setup):
         text = units.service(process, setup, python, folder, facts.systemd)
-        files.append(File(f"{home}/{units.unit_name(setup.name, process.name)}", text.encode()))
+        files.append(File(f"{home}/{unit_name(setup.name, process.name)}", text.encode()))
     return files
 
 
 def _settings(setup: Setup, facts: Facts, keys: Path | None) -> list[File]:
     """The set-up, for `lira status`, and the keys with what names them. Raises `ConfigError` for what are none."""
-    files = [File(f"{_config(setup)}/{SETUP}", msgspec.json.format(msgspec.json.encode(setup)) + b"\n")]
+    files = [File(f"{config_folder(setup.name)}/{SETUP}", msgspec.json.format(msgspec.json.encode(setup)) + b"\n")]
     if keys is None:
         return files
     load_keys(keys)
     bundle = [path for path in sorted(keys.iterdir()) if path.is_file()]
-    files += [File(f"{_config(setup)}/keys/{path.name}", path.read_bytes(), SECRET) for path in bundle]
-    variable = f"{VARIABLE}={facts.home}/{_config(setup)}/keys\n"
-    return [*files, File(f"{_config(setup)}/environment", variable.encode())]
+    files += [File(f"{config_folder(setup.name)}/keys/{path.name}", path.read_bytes(), SECRET) for path in bundle]
+    variable = f"{VARIABLE}={facts.home}/{config_folder(setup.name)}/keys\n"
+    return [*files, File(f"{config_folder(setup.name)}/environment", variable.encode())]
 
 
 def _with_files(setup: Setup, facts: Facts) -> tuple[Setup, list[File]]:
@@ -82,7 +78,7 @@ def _with_files(setup: Setup, facts: Facts) -> tuple[Setup, list[File]]:
         if local.suffix != ".toml":
             words.append(word)
         elif local.is_file():
-            files.append(File(f"{_config(setup)}/{local.name}", local.read_bytes()))
+            files.append(File(f"{config_folder(setup.name)}/{local.name}", local.read_bytes()))
             words.append(f"{facts.home}/{files[-1].path}")
         else:
             raise ConfigError(f"there is no {word} here", "Give the path of the file on this machine: it goes along.")
@@ -91,6 +87,6 @@ def _with_files(setup: Setup, facts: Facts) -> tuple[Setup, list[File]]:
 
 def _udev(setup: Setup, place: str) -> tuple[str, ...]:
     return (
-        f"sudo install -m 644 ~/{_config(setup)}/{Path(place).name} {place}",
+        f"sudo install -m 644 ~/{config_folder(setup.name)}/{Path(place).name} {place}",
         "sudo udevadm control --reload && sudo udevadm trigger",
     )

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from lira.hal.errors import ConfigError
-from lira.tools.deploy.plan import Plan
+from lira.tools.deploy.plan import Plan, manifest_of
 from lira.tools.launch.processes import ProcessError
 
 LOOK_S = 30.0
@@ -49,7 +49,7 @@ class Target:
 
     def look(self, name: str) -> Facts:
         """Find out what matters; nothing is changed."""
-        lines = self.run(LOOK, f".config/lira/{name}/deployed", timeout_s=LOOK_S).splitlines()
+        lines = self.run(LOOK, manifest_of(name), timeout_s=LOOK_S).splitlines()
         if len(lines) < 3 or not lines[1].isdecimal():
             raise ProcessError(
                 f"{self.where} does not answer as a Unix machine does", "See what its shell prints first."

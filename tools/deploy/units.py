@@ -3,22 +3,13 @@
 from collections.abc import Sequence
 
 from lira.tools.lifecycle.restart import FIRST_S, LONGEST_S, READY_S
+from lira.tools.lifecycle.services import config_folder, target_name, unit_name
 from lira.tools.lifecycle.setup import Setup
 from lira.tools.lifecycle.table import Process, rows
 
 STOP_S = 20
 STEPS = 5  # from the shortest pause to the longest: each twice the one before
 WITH_STEPS = 254  # systemd's version that knows them
-
-
-def unit_name(setup_name: str, process: str) -> str:
-    """Name of a process's unit."""
-    return f"lira-{setup_name}-{process}.service"
-
-
-def target_name(setup_name: str) -> str:
-    """Name of what holds them together."""
-    return f"lira-{setup_name}.target"
 
 
 def quoted(words: Sequence[str]) -> str:
@@ -53,7 +44,7 @@ def service(process: Process, setup: Setup, python: str, folder: str, systemd: i
         "NotifyAccess=main",
         f"ExecStart={quoted(process.command(setup, python))}",
         f"WorkingDirectory={folder.replace('%', '%%')}",
-        f"EnvironmentFile=-%h/.config/lira/{setup.name}/environment",
+        f"EnvironmentFile=-%h/{config_folder(setup.name)}/environment",
         "Environment=PYTHONUNBUFFERED=1",
         f"TimeoutStartSec={READY_S:g}",
         f"WatchdogSec={process.patience_s:g}",
