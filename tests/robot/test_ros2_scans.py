@@ -46,7 +46,7 @@ def twin_scans(name, count=3):
 
 
 def slam_toolbox_count(scan):
-    """How many readings a scan has to have; one with another count is dropped. Ours of a whole turn ends one beam before
+    """How many readings a scan has to have; one with another count is dropped. Ours of a whole turn ends a beam before
     it begins, so it is none of those that have the first beam twice.
     """
     wide = abs(scan.angle_max - scan.angle_min)
