@@ -26,7 +26,7 @@ ROOMS = {
         "rmw": {"errors", "messages"},
         "profile": {"errors", "config", "messages"},
         "port": {"messages", "profile"},
-        "bus": {"errors", "clock", "messages", "profile"},
+        "bus": {"errors", "clock", "messages", "rmw", "profile"},
         "description": {"errors", "messages", "profile"},
         "ros_graph": {"errors", "messages", "rmw", "bus"},
         "safety": {"clock", "messages", "profile", "port"},
