@@ -42,7 +42,7 @@ GROUPS = {
         "joystick": "drive by hand: a gamepad on this machine, straight to the robot",
         "console": "watch the robot learn on a screen",
         "web": "watch, teach and drive the robot from a page in the browser",
-        "view": "show the robot in Foxglove, and its numbers to Prometheus; it only looks",
+        "view": "show the robot in Foxglove or Rerun, and its numbers to Prometheus; it only looks",
         "world": "draw a world from above and as the camera sees it",
     },
     ("records", "Records"): {
