@@ -22,7 +22,7 @@ from lira.tools.live.scripted_person import live, person_for
 from lira.tools.report.digest import load_run
 
 pytestmark = [pytest.mark.slow, pytest.mark.alone]
-WORLD, SPEED = "line-obstacles", 2.0
+WORLD, SPEED = "line-obstacles", 1.5
 PAD = 5
 READY_S, WHOLE_S = 90.0, 600.0
 MIDDLE, REACH = 128, 127
