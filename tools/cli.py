@@ -30,6 +30,8 @@ EXTRAS = {
     "threadpoolctl": "drive",
     "pygame": "console",
     "cryptography": "keys",
+    "mcap": "record",
+    "zstandard": "record",
     "foxglove": "view",
     "prometheus_client": "view",
 }

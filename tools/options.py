@@ -46,6 +46,13 @@ def add_server(parser: argparse.ArgumentParser) -> None:
     add("--insecure", action="store_true", help="let other machines in without keys (see lira keys)")
 
 
+def add_record(parser: argparse.ArgumentParser) -> None:
+    """Declare `--no-record`."""
+    parser.add_argument(
+        "--no-record", action="store_true", help="do not record the bus into the folder of the run (see lira record)"
+    )
+
+
 def add_profile(parser: argparse.ArgumentParser, default: str, what: str = "robot") -> None:
     """Declare `--profile`."""
     parser.add_argument("--profile", default=default, help=f"{what} by name or .toml file {DEFAULT}")
@@ -99,6 +106,15 @@ def add_shield(parser: argparse.ArgumentParser, who: str) -> None:
     )
 
 
+def add_paused(parser: argparse.ArgumentParser) -> None:
+    """Declare `--paused`."""
+    parser.add_argument(
+        "--paused",
+        action="store_true",
+        help="begin paused: the robot stands until a person asks to go on (P on a screen, square on the pad)",
+    )
+
+
 def add_expert(parser: argparse.ArgumentParser) -> None:
     """Declare `--expert`."""
     parser.add_argument(
@@ -126,3 +142,8 @@ def add_protocol(parser: argparse.ArgumentParser, layouts: str | None = None, pr
         help="what ends the teaching: the novice alone passes the lap it was just taught on (own), K layouts in a row "
         f"that it has never seen (fresh:K), or K of N (fresh:K/N; default: {usual})",
     )
+
+
+def add_ros_domain(parser: argparse.ArgumentParser, what: str) -> None:
+    """Declare `--domain`."""
+    parser.add_argument("--domain", type=natural, default=0, metavar="N", help=f"{what} {DEFAULT}")

@@ -5,6 +5,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Protocol, runtime_checkable
 
+from lira.fusion.learning.labels import Label
 from lira.fusion.learning.learned_policy import UNTAUGHT, LearnedPolicy
 from lira.fusion.preprocess import Features
 from lira.hal.messages import Action, Call, Driver, ExpertView, Phase
@@ -13,6 +14,21 @@ Policy = Callable[[Features], Action]
 """A black box: anything that turns what the robot senses into an action."""
 
 STAND: Action = (0.0, 0.0)
+
+
+@dataclass(frozen=True, slots=True)
+class AsTaught:
+    """What a policy under training does now; equal to what it does at another moment if it has learned nothing since.
+
+    `training_steps` is how often it had learned.
+    """
+
+    act: Policy
+    training_steps: int
+
+    def __call__(self, features: Features) -> Action:
+        """Act on what is seen."""
+        return self.act(features)
 
 
 @dataclass(frozen=True, slots=True)
@@ -105,6 +121,10 @@ class Method(ABC):
         """Train if it is time to, and adopt what training has brought by now."""
         self.novice.update(now_s)
 
+    def remember(self, label: Label) -> None:
+        """Take in a label that an earlier session stored."""
+        self.novice.remember(label)
+
     @abstractmethod
     def propose(self, features: Features) -> Proposal:
         """Decide as if no human were there."""
@@ -122,8 +142,12 @@ class Method(ABC):
         return Lesson(Choice(Driver.HUMAN, human, label=human), stored)
 
     def policy(self, driver: str) -> Policy:
-        """Return the policy behind a driver's name, to look ahead with. Raises `KeyError` for the human."""
-        return {**{expert.name: expert.act for expert in self.experts}, Driver.NOVICE: self.novice.act}[driver]
+        """Return the policy behind a driver's name, to look ahead with. Raises `KeyError` for the human.
+
+        One that equals that of another moment does the same wherever it sees the same.
+        """
+        novice: Policy = AsTaught(self.novice.act, self.novice.training_steps)
+        return {**{expert.name: expert.act for expert in self.experts}, Driver.NOVICE: novice}[driver]
 
     def alone(self, phase: Phase) -> "Method":
         """Return what drives without a teacher, to be proven or on unseen layouts: the novice, if anybody learns."""

@@ -7,25 +7,28 @@ import itertools
 import secrets
 import time
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from functools import partial
 from typing import Any, TypeVar
 
 import zenoh
 
 from lira.hal.bus.access_log import Refusals
-from lira.hal.bus.attachment import Attachment
+from lira.hal.bus.attachment import attach
 from lira.hal.bus.boundary import Boundary
-from lira.hal.bus.connection import Connection
+from lira.hal.bus.connection import Connection, Declared
 from lira.hal.bus.endpoint import DEFAULT_ROBOT, check_address, check_name, is_loopback
 from lira.hal.bus.expiry import Reminder
 from lira.hal.bus.keys import Keys, keys_from_environment, load_keys
 from lira.hal.bus.publisher import Publisher
 from lira.hal.bus.questions import Answer, Questions, ask_once
-from lira.hal.bus.reader import Reader
+from lira.hal.bus.reader import Reader, Tap
 from lira.hal.bus.topics import COMMANDS, Qos, Topic, named
 from lira.hal.bus.zenoh_session import open_session
+from lira.hal.clock import TimeBase, unix_offset_s
 from lira.hal.errors import BusError, ConfigError
+from lira.hal.rmw.services import TRIGGER
+from lira.hal.rmw.tokens import Kind, Route
 
 M = TypeVar("M")
 
@@ -72,6 +75,8 @@ class Bus:
         self.epoch = secrets.randbits(64)
         self.refusals = refusals or Refusals()
         self.boundary = Boundary()
+        self._time_base = TimeBase()
+        self._announced: list[Declared[Any]] = []
         self._counts: dict[str, Iterator[int]] = {}  # what was sent, by key: they grow whoever sends
         keys = keys or keys_from_environment()
         self.encrypted = keys is not None
@@ -99,11 +104,21 @@ class Bus:
             self.close()
             raise BusError(f"cannot open the bus at {connect}", "Check the address, and that the robot runs.")
 
+    def count_from_1970(self, now: Callable[[], float]) -> None:
+        """Tell and hear all times on the clock `now` as seconds since 1970; measured once, now."""
+        self._time_base.offset_s = unix_offset_s(now)
+
+    @property
+    def offset_s(self) -> float:
+        """What times on the bus are ahead of those of this process."""
+        return self._time_base.offset_s
+
     def publisher(self, topic: Topic[M], qos: Qos | None = None) -> Publisher[M]:
         """Declare a publisher; `qos` replaces the table's."""
         key = self._key(self._own(topic).key)
-        attach = partial(_attach, self.epoch, self._counts.setdefault(key, itertools.count(1)))
-        return Publisher(self._connection, key, topic, qos or topic.qos, attach)
+        base = self._time_base
+        beside = partial(attach, self.epoch, self._counts.setdefault(key, itertools.count(1)), base)
+        return Publisher(self._connection, key, topic, qos or topic.qos, beside, base)
 
     def put_raw(self, topic: Topic[Any], payload: bytes, attachment: bytes | None = None) -> None:
         """Send bytes as they are: for relays, recorders and tests of what a bus has to bear."""
@@ -117,11 +132,23 @@ class Bus:
 
     def reader(self, topic: Topic[M], depth: int = 1) -> Reader[M]:
         """Declare a reader that keeps the newest `depth` messages between polls."""
-        return Reader(self._connection, self._key(topic.key), topic, depth, self.boundary)
+        return Reader(self._connection, self._key(topic.key), topic, depth, self.boundary, self._time_base)
+
+    def tap(self) -> Tap:
+        """Hear everything that this session may hear, as it came."""
+        return Tap(self._connection, self._prefix, self.boundary)
 
     def questions(self, key: str) -> Questions:
         """Answer queries on a key."""
         return Questions(self._connection, self._key(key), key, self.boundary, self.epoch)
+
+    def announce(self, topic: Topic[Any]) -> None:
+        """Make a topic known to bridges to ROS 2, so that `ros2 topic list` shows it before anybody listens."""
+        self._announce(Kind.PUBLISHER, topic.key, topic.ros_type, latched=topic.qos.latched)
+
+    def announce_service(self, key: str) -> None:
+        """Make known to bridges that queries on a key are answered as a `Trigger`: without, they pass none on."""
+        self._announce(Kind.SERVICE, key, TRIGGER)
 
     def ask(self, key: str, payload: bytes = b"", timeout_s: float = 5.0) -> bytes:
         """Query a key and return the answer; asks again while nobody is there to answer.
@@ -167,9 +194,13 @@ class Bus:
 
     def short_peers(self) -> int:
         """How many peers have less than two links, so that their UDP does not get through. Watchers need but one."""
+        return len(self.short_sessions())
+
+    def short_sessions(self) -> frozenset[str]:
+        """The ids of these peers' sessions."""
         session = self._session
         counts = Counter(str(link.zid) for link in session.info.links())
-        return sum(counts[str(zid)] < LINKS_PER_PEER for zid in session.info.peers_zid())
+        return frozenset(zid for zid in map(str, session.info.peers_zid()) if counts[zid] < LINKS_PER_PEER)
 
     def close(self, timeout_s: float = CLOSE_S) -> bool:
         """Close the session; False if a dead link kept it from closing in time. May be called twice."""
@@ -180,6 +211,13 @@ class Bus:
     @property
     def _session(self) -> zenoh.Session:
         return self._connection.session
+
+    def _announce(self, kind: Kind, key: str, ros_type: str, *, latched: bool = False) -> None:
+        def declare(session: zenoh.Session) -> Any:
+            route = Route(str(session.zid()), kind, self._key(key), ros_type, latched)
+            return session.liveliness().declare_token(route.token)
+
+        self._announced.append(self._connection.declare(declare))
 
     def _keys_changed(self) -> bool:
         return self._keys is not None and self._keys.changed()
@@ -196,8 +234,3 @@ class Bus:
 
     def _key(self, key: str) -> str:
         return f"{self._prefix}/{key}" if self._prefix else key
-
-
-def _attach(epoch: int, count: Iterator[int], time_s: float, seq: int | None, answers: int, *, released: bool) -> bytes:
-    number = next(count) if seq is None else seq
-    return Attachment(epoch, number, round(time_s * 1e9), answers, released).to_bytes()

@@ -1,11 +1,16 @@
 """The values that cross modules. Messages that mirror ROS keep its field names."""
 
+from lira.hal.messages.description import CameraInfo, Text, Transform, Transforms
 from lira.hal.messages.learning import (
     Call,
+    CallName,
     Decision,
     Driver,
     ExpertView,
+    FeatureArray,
     LabelCounts,
+    MethodCall,
+    MethodCalls,
     Phase,
     SessionState,
     Stage,
@@ -50,6 +55,7 @@ from lira.hal.messages.values import (
     Range,
     Request,
     Seed,
+    Spread,
     WordArray,
 )
 
@@ -65,6 +71,8 @@ __all__ = [
     "Bool",
     "ByteArray",
     "Call",
+    "CallName",
+    "CameraInfo",
     "Clock",
     "Command",
     "CompressedImage",
@@ -76,6 +84,7 @@ __all__ = [
     "Driver",
     "Episode",
     "ExpertView",
+    "FeatureArray",
     "FloatArray",
     "Image",
     "Imu",
@@ -83,6 +92,8 @@ __all__ = [
     "JoyFeedback",
     "LabelCounts",
     "LaserScan",
+    "MethodCall",
+    "MethodCalls",
     "Observation",
     "Odometry",
     "OperatorAnswer",
@@ -94,7 +105,11 @@ __all__ = [
     "Seed",
     "SessionState",
     "Source",
+    "Spread",
     "Stage",
+    "Text",
+    "Transform",
+    "Transforms",
     "Twist",
     "TwistStamped",
     "WordArray",

@@ -86,6 +86,54 @@ class ExpertView:
 
 
 @dataclass(frozen=True, slots=True)
+class FeatureArray:
+    """What a method sees of one sensor, as labels keep it (`fusion.preprocess.Modality.keep`)."""
+
+    name: str
+    data: bytes
+
+
+class CallName(StrEnum):
+    """What a method was asked (`MethodCall`): the functions of `fusion.methods.base.Method`, and its life's ends."""
+
+    BEGIN = "begin"
+    REMEMBER = "remember"  # a label from before
+    UPDATE = "update"
+    PROPOSE = "propose"
+    CHOOSE = "choose"
+    LEARN = "learn"
+    ALONE = "alone"
+    RESET = "reset"
+    END = "end"
+
+
+@dataclass(frozen=True, slots=True)
+class MethodCall:
+    """One call of a method: what it got, and what came of it (`outcome`, JSON).
+
+    `target` is 0 for the method itself, and n for the n-th driver that its `alone` gave. `argument` is the settings as
+    JSON (begin), a label's source (remember), an expert (choose) or a phase (alone). `action` is the human's (learn) or
+    a label's.
+    """
+
+    name: CallName
+    target: int = 0
+    time_s: float = 0.0
+    argument: str = ""
+    action: Action | None = None
+    features: tuple[FeatureArray, ...] = ()
+    outcome: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class MethodCalls:
+    """The calls of a method since the last message, in order (`lira/method`): enough to go through it again."""
+
+    stamp_s: float
+    calls: tuple[MethodCall, ...]
+
+
+@dataclass(frozen=True, slots=True)
 class LabelCounts:
     """Labels by source; `given` is before the redundancy filter, `stored` after it."""
 

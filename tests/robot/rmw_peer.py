@@ -61,7 +61,6 @@ class RmwPeer(Peer):
         self._domain, self._hashed = domain, hashed
         self._command = STAMPED if stamped else TWIST
         self._numbers = count(10)
-        self._tokens = []
         self.refused = []  # what a subscriber of rmw_zenoh would have dropped or failed on
         self.numbers = []
         super().__init__(port, namespace, attach)

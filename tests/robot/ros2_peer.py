@@ -83,12 +83,22 @@ def twist_cdr(linear_m_s, angular_rad_s):
     return Cdr().put("d", linear_m_s, 0.0, 0.0, 0.0, 0.0, angular_rad_s).payload()
 
 
+ROUTES = {
+    "scan": "sensor_msgs/msg/LaserScan",
+    "camera/color/image_raw/compressed": "sensor_msgs/msg/CompressedImage",
+    "odom": "nav_msgs/msg/Odometry",
+}
+
+
 class Peer:
     """A robot behind a bridge. Its ROS clock is not this machine's. `silent` topics say nothing."""
 
-    def __init__(self, port, namespace="", attach="no attachment", datagrams=False):
+    def __init__(self, port, namespace="", attach="no attachment", datagrams=False, command="Twist"):
         self._prefix = f"{namespace}/" if namespace else ""
         self._attach = attach
+        self.port = port
+        self._command_type = f"geometry_msgs/msg/{command}"
+        self._tokens = []
         self._offset_ns = 1_700_000_000 * 10**9
         self._number = 0
         self.silent = set()
@@ -116,6 +126,12 @@ class Peer:
         return self._prefix + topic
 
     def _subscribe(self):
+        """Hear commands, and announce what is routed as the bridge does to other bridges."""
+        routes = {("MP", name): kind for name, kind in ROUTES.items()} | {("MS", "cmd_vel"): self._command_type}
+        for (kind, name), type_name in routes.items():
+            key, told = self._key(name).replace("/", "§"), type_name.replace("/", "§")
+            token = f"@/{self._session.zid()}/@ros2_lv/{kind}/{key}/{told}/:::"
+            self._tokens.append(self._session.liveliness().declare_token(token))
         return self._session.declare_subscriber(self._key("cmd_vel"), self._hear)
 
     def now_ns(self):

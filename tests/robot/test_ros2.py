@@ -4,81 +4,32 @@ import math
 import re
 import threading
 import time
-from contextlib import closing, contextmanager
+from contextlib import closing
 
 import numpy as np
 import pytest
 from mcap.records import Schema
 from mcap_ros2.decoder import DecoderFactory
 from ros2_peer import ATTACHMENTS, Peer, twist_cdr
+from ros2_rig import GO, PROFILE, drive_until, get_going, served, wait_for
 
 from lira.hal.bus.bus import Bus
-from lira.hal.client.remote import RemoteRobot
 from lira.hal.errors import BusError, ConfigError, DeviceError
-from lira.hal.messages import STOP, Command, CompressedImage, LaserScan, Reason, Twist
+from lira.hal.messages import STOP, Command, CompressedImage, LaserScan, Reason
 from lira.hal.messages.ros_table import definition
-from lira.hal.profile import load_profile
-from lira.hal.safety.governed import GovernedRobot
-from lira.hal.server.server import HalServer
 from lira.robot.ros2.forms import placed_scan, plain_picture
 from lira.robot.ros2.robot import Interface, Ros2Robot
 from lira.tools.cli import main
 from lira.tools.launch.processes import ChildProcess, free_port, lira_command
 
-PROFILE = load_profile("thesis-sim")
-GO = Twist(0.3, 0.5)
 STAMPED = "geometry_msgs/msg/TwistStamped"
 ZERO = bytes(48)  # six doubles
 
 
-@contextmanager
-def served(interface=Interface(), namespace="", **peer):  # noqa: B008 - frozen
-    """A peer, our server for it in a thread, and a client of that."""
-    far_port, near_port = free_port(), free_port()
-    robot = Peer(far_port, namespace, **peer)
-    name, endpoint, stop = f"ros_{near_port}", f"127.0.0.1:{near_port}", threading.Event()
-    far = Bus(name, connect=f"127.0.0.1:{far_port}", prefix=namespace)
-    near = Bus(name, listen=endpoint)
-    governed = GovernedRobot(Ros2Robot(PROFILE, far, interface))
-    server = threading.Thread(target=HalServer(governed, near).run, args=(stop,))
-    server.start()
-    bus = Bus(name, connect=endpoint)
-    client = RemoteRobot(bus, answer_s=10.0)
-    try:
-        client.open()
-        yield robot, client
-    finally:
-        client.close()
-        stop.set()
-        server.join(10.0)
-        for each in (bus, near, far):
-            assert each.close()
-        robot.close()
-
-
-def drive_until(client, twist, wanted, timeout_s=5.0):
-    until_s = time.monotonic() + timeout_s
-    while not wanted(applied := client.drive(Command(twist, client.now()))):
-        assert time.monotonic() < until_s, applied
-        time.sleep(0.005)
-    return applied
-
-
-def get_going(client):
-    drive_until(client, STOP, lambda applied: applied.reason is Reason.OK)
-    drive_until(client, GO, lambda applied: applied.twist == GO)
-
-
-def wait_for(condition, timeout_s=5.0):
-    until_s = time.monotonic() + timeout_s
-    while not condition():
-        assert time.monotonic() < until_s
-        time.sleep(0.01)
-
-
 @pytest.mark.parametrize("attach", ATTACHMENTS)
-def test_its_sensors_are_seen_whatever_is_attached_and_a_twist_reaches_it_as_ros_has_it(attach):
-    with served(namespace="robot1", attach=attach) as (robot, client):
+@pytest.mark.parametrize("rmw", [False, True])
+def test_its_sensors_are_seen_whatever_is_attached_and_a_twist_reaches_it_as_ros_has_it(attach, rmw):
+    with served(namespace="robot1", attach=attach, rmw=rmw) as (robot, client):
         get_going(client)
         wait_for(lambda: robot.commands[-1][1] == twist_cdr(0.3, 0.5))
         wait_for(lambda: None not in ((seen := client.read()).scan, seen.image, seen.odom))
@@ -93,8 +44,9 @@ def test_its_sensors_are_seen_whatever_is_attached_and_a_twist_reaches_it_as_ros
     assert robot.commands[-1][1] == twist_cdr(0.0, 0.0)
 
 
-def test_a_controller_that_wants_stamps_gets_them_on_its_own_clock():
-    with served(Interface(stamped=True)) as (robot, client):
+@pytest.mark.parametrize("far", [{}, {"rmw": True, "stamped": True}])
+def test_a_controller_that_wants_stamps_gets_them_on_its_own_clock(far):
+    with served(Interface(stamped=True), **far) as (robot, client):
         get_going(client)
         schema = Schema(1, data=definition(STAMPED).encode(), encoding="ros2msg", name=STAMPED)
         decode = DecoderFactory().decoder_for("cdr", schema)
@@ -107,9 +59,10 @@ def test_a_controller_that_wants_stamps_gets_them_on_its_own_clock():
         assert -0.01 < age_s < 0.2
 
 
+@pytest.mark.parametrize("rmw", [False, True])
 @pytest.mark.parametrize(("topic", "clamp"), [("scan", "no_lidar"), ("camera/color/image_raw/compressed", "no_camera")])
-def test_what_falls_silent_stops_it_until_it_is_back_and_a_neutral_command_came(topic, clamp):
-    with served() as (robot, client):
+def test_what_falls_silent_stops_it_until_it_is_back_and_a_neutral_command_came(topic, clamp, rmw):
+    with served(rmw=rmw) as (robot, client):
         get_going(client)
         robot.silent.add(topic)
         silent_s = time.monotonic()
@@ -122,8 +75,9 @@ def test_what_falls_silent_stops_it_until_it_is_back_and_a_neutral_command_came(
         get_going(client)
 
 
-def test_commands_go_on_at_20_hz_and_end_when_the_client_does():
-    with served() as (robot, client):
+@pytest.mark.parametrize("rmw", [False, True])
+def test_commands_go_on_at_20_hz_and_end_when_the_client_does(rmw):
+    with served(rmw=rmw) as (robot, client):
         get_going(client)
         before = len(robot.commands)
         until_s = time.monotonic() + 1.0
@@ -196,7 +150,7 @@ def test_where_no_bridge_is_that_is_said(monkeypatch):
 @pytest.mark.parametrize("datagrams", [False, True])
 def test_the_verb_serves_it_for_lira_fusion_and_says_what_is_missing(tmp_path, datagrams):
     far_port, near_port = free_port(), free_port()
-    robot = Peer(far_port, datagrams=datagrams)
+    robot = Peer(far_port, datagrams=datagrams, command="TwistStamped" if datagrams else "Twist")
     name, near = f"verb_{near_port}", f"127.0.0.1:{near_port}"
     words = ["ros2", "--connect", f"127.0.0.1:{far_port}", "--name", name, "--listen", near, "--profile", "thesis-sim"]
     words += ["--lidar-yaw", "180", *(["--cmd-vel", "twist_stamped"] if datagrams else [])]
@@ -209,7 +163,7 @@ def test_the_verb_serves_it_for_lira_fusion_and_says_what_is_missing(tmp_path, d
                 assert server.output().count("warning:") == 1
             else:
                 server.wait_ready("a Twist carries no time", 10.0)
-                server.wait_ready("one link to the bridge", 10.0)
+                server.wait_ready("one link to the robot", 10.0)
             policy = ["drive", "lidar-expert", "--name", name, "--connect", near]
             with ChildProcess("the policy", lira_command(*policy), tmp_path / "lira.fusion.log") as fusion:
                 fusion.wait_ready("drives", 60.0)

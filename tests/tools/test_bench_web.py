@@ -3,7 +3,7 @@
 import pytest
 
 pytest.importorskip("aiohttp", reason="needs aiohttp: pip install 'lira-rosbot[web]'")
-from lira.tools.bench import web  # noqa: E402
+from lira.tools.bench import web
 
 
 @pytest.mark.alone

@@ -46,8 +46,8 @@ from lira.tools.live.session import LiveSession
 from lira.tools.live.verdict import has_passed, judged_words, verdict_words
 from lira.tools.runs.build import teacher
 from lira.tools.runs.course import Course
+from lira.tools.runs.plan import Plan
 from lira.tools.runs.simulated import simulate
-from lira.tools.runs.teach import Plan
 
 RESULT = ResultRecord(False, 1, 0, 0, 0, 0, 0, 0, 1.0, 1.0)
 PASSED = LapRecord(Phase.PROVE, 1, 0, True, True, 80.0, 0, 0, 0.1, 10, 2, 3, 20, 5, 1.0)

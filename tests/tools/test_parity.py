@@ -28,7 +28,7 @@ from lira.tools.parity.page import render
 from lira.tools.parity.record import Heard, InterruptedScriptError, Recording, Span, record
 from lira.tools.parity.script import motions
 from lira.tools.parity.sight import match_scans
-from lira.tools.verbs import parity
+from lira.tools.verbs.robots import parity
 
 PROFILE = load_profile("rosbot2")
 WALLS = (3.0, -1.5, 2.0, -1.2)  # of a room, seen from the robot: ahead, behind, left, right

@@ -11,7 +11,7 @@ from lira.fusion.methods.presets import METHODS
 from lira.hal.errors import ConfigError, StorageError
 from lira.hal.profile import load_profile
 from lira.tools.cli import main
-from lira.tools.runs.teach import Plan
+from lira.tools.runs.plan import Plan
 from lira.tools.study import script
 from lira.tools.study.analysis import paired, render
 from lira.tools.study.conduct import Study

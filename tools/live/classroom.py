@@ -16,10 +16,10 @@ from lira.fusion.operator_service import Job
 from lira.hal.messages import Driver
 from lira.hal.profile import RobotProfile
 from lira.tools.live.before import days_before
-from lira.tools.runs.build import NewTrainer, build_method
+from lira.tools.runs.build import NewTrainer
 from lira.tools.runs.folder import LABELS, RECORD, snapshot
-from lira.tools.runs.progress import Say
-from lira.tools.runs.teach import Plan
+from lira.tools.runs.plan import Plan, build_traced
+from lira.tools.runs.progress import Publish, Say
 
 
 class Classroom:
@@ -28,11 +28,19 @@ class Classroom:
     Raises `StorageError` for a damaged or foreign log, `ConfigError` for another method than the folder's.
     """
 
-    def __init__(self, plan: Plan, profile: RobotProfile, world: str, trainer: NewTrainer, say: Say) -> None:
+    def __init__(
+        self,
+        plan: Plan,
+        profile: RobotProfile,
+        world: str,
+        trainer: NewTrainer,
+        say: Say,
+        publish: Publish | None = None,
+    ) -> None:
         assert plan.folder is not None
         self.folder: Path = plan.folder
         self._plan, self._profile, self._world = plan, profile, world
-        self._trainer, self._say = trainer, say
+        self._trainer, self._publish, self._say = trainer, publish, say
         self.head: RunRecord = plan.head(profile, world)
         self.before = days_before(self.folder / RECORD, self.head)
         self._log = self._open_log()
@@ -87,9 +95,9 @@ class Classroom:
         """A new learner that has learned all that is in the log."""
         plan = self._plan
         pair = plan.pair or task_of(self._world)
-        method = build_method(plan.preset, self._profile, plan.seed, self._trainer, pair, plan.more, plan.build)
+        method = build_traced(plan, self._profile, self._trainer, pair, self._publish)
         novice = method.novice
         for old in read_demonstrations(self.folder / LABELS):
             if old.stored:
-                novice.remember(Label(old.features, old.action, old.source, novice.weight(old.source)))
+                method.remember(Label(old.features, old.action, old.source, novice.weight(old.source)))
         return method

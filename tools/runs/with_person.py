@@ -13,13 +13,15 @@ from lira.fusion.operator_service import OperatorService
 from lira.fusion.service import serve
 from lira.hal.client.remote import RemoteRobot
 from lira.tools.launch.lifetime import saving, stop_or_interrupt
+from lira.tools.launch.notify import Notifier
 from lira.tools.live.before import days_before
 from lira.tools.operator.voice import explain
-from lira.tools.runs.build import NewTrainer, build_method
+from lira.tools.recording.beside import recorder_beside
+from lira.tools.runs.build import NewTrainer
 from lira.tools.runs.folder import LABELS, RECORD, snapshot
+from lira.tools.runs.plan import Plan, build_traced
 from lira.tools.runs.progress import Publish, Say
-from lira.tools.runs.reach import hand_of, request_line, restarter, world_of
-from lira.tools.runs.teach import Plan
+from lira.tools.runs.reach import PAUSED, hand_of, request_line, restarter, world_of
 
 
 def learn_from_person(
@@ -28,20 +30,23 @@ def learn_from_person(
     """Learn from whoever takes control with the dead-man, until Ctrl-C; then, or when it fails, save the novice."""
     profile, world = robot.profile, world_of(robot)
     head, folder = plan.head(profile, world), plan.folder
+    notifier = Notifier.from_environment()
     assert folder is not None
     before = days_before(folder / RECORD)
     # The log goes first: if it is damaged, nothing else is touched.
     with (
         DemonstrationLog(folder / LABELS, profile, mirrored=plan.preset.mirrored, say=say) as log,
         RunWriter(folder / RECORD) as record,
+        recorder_beside(args, folder, say) as wait_for_recorder,
     ):
-        method = build_method(plan.preset, profile, plan.seed, trainer, plan.pair or task_of(world), plan.more)
+        wait_for_recorder()
+        method = build_traced(plan, profile, trainer, plan.pair or task_of(world), publish)
         novice = method.novice
         with saving(lambda: snapshot(folder, novice, profile, head), say), contextlib.closing(method):
             record.write(head)
             for old in read_demonstrations(log.path):
                 if old.stored:
-                    novice.remember(Label(old.features, old.action, old.source, novice.weight(old.source)))
+                    method.remember(Label(old.features, old.action, old.source, novice.weight(old.source)))
             journal = Journal(keep=log.append, write=record.write, publish=publish)
             if (newest := before.newest) is not None:
                 journal.ledger.go_on(newest.labels, newest.interventions, newest.calls, before.account)
@@ -56,9 +61,13 @@ def learn_from_person(
                     say,
                     restart=restarter(robot, args),
                     snapshot=lambda: snapshot(folder, novice, profile, head, log.sync),
+                    paused=args.paused,
                 )
-                loop.arm()
-                say(f"{args.method} learns on '{args.name}' with {novice.stored} labels; hold the dead-man to drive")
+                service.begin()
+                how = PAUSED if args.paused else "hold the dead-man to drive"
+                words = f"{args.method} learns on '{args.name}' with {novice.stored} labels; {how}"
+                say(words)
+                notifier.ready(words)
                 with contextlib.closing(service):
                     serve(
                         loop,
@@ -71,6 +80,7 @@ def learn_from_person(
                         explain=explain,
                         layout=args.layout,
                         is_attended=lambda: hand.holds,
+                        alive=notifier.alive,
                     )
                 record.write(_result(journal, service.episode, novice.training_steps, robot.now() - began_s))
     return 0

@@ -44,9 +44,16 @@ GROUPS = {
         "world": "draw a world from above and as the camera sees it",
     },
     ("records", "Records"): {
+        "record": "record everything on a robot's bus, for later and for others' tools",
+        "info": "what a recording holds",
+        "rerun": "put a recorded run through its method again: the same, or what would have been otherwise",
         "report": "make the HTML page of a recorded run",
     },
     ("operation", "Operation"): {
+        "up": "start all that a robot needs, and keep it running: twin, learner, page, pad",
+        "status": "what is up: processes, rates, ages, link, who drives",
+        "logs": "what the processes that are up have written",
+        "down": "stop all that is up, drivers first and the robot last",
         "keys": "make the keys that say who may drive a robot, and encrypt the bus",
     },
     ("checks", "Checks"): {

@@ -17,7 +17,7 @@ exit status: 1 if a layout was not passed
 import argparse
 
 from lira.tools.launch.lifetime import CLOSE_S
-from lira.tools.options import add_arena, add_client, add_layout, add_pair, add_shield, natural
+from lira.tools.options import add_arena, add_client, add_layout, add_pair, add_paused, add_shield, natural
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -30,6 +30,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     add_client(parser)
     add_arena(parser)
+    add_paused(parser)
     add_pair(parser)
     add(
         "--ask",
@@ -51,8 +52,8 @@ def run(args: argparse.Namespace) -> int:
     from lira.fusion.inference.threads import one_thread
     from lira.hal.client.remote import connect
     from lira.tools.runs.alone import examine, show
-    from lira.tools.runs.reach import decisions_of, say
+    from lira.tools.runs.reach import reports_of, say
 
     one_thread()
     with connect(args.connect, args.name, close_s=CLOSE_S) as robot:
-        return (examine if args.unseen else show)(args, robot, decisions_of(robot), say)
+        return (examine if args.unseen else show)(args, robot, reports_of(robot), say)

@@ -1,11 +1,14 @@
-"""Drive a robot that runs ROS 2 and zenoh-bridge-ros2dds, with nothing of ours on it: serve it here like any other.
+"""Drive a robot that runs ROS 2, with nothing of ours on it: serve it here like any other.
 
-On the robot: zenoh-bridge-ros2dds. Here: this verb, and then lira fusion, lira joystick and lira console as always. The
-governor (limits, time-outs, emergency stop, who may drive) works here. When this machine or the radio fails, only what
-the robot's own ROS stack does stops it. robot/README.md says more.
+On the robot: zenoh-bridge-ros2dds; or its ROS runs rmw_zenoh (--rmw), and then its router is all that is needed. Here:
+this verb, and then lira fusion, lira joystick and lira console as always. The governor (limits, time-outs, emergency
+stop, who may drive) works here. When this machine or the radio fails, only what the robot's own ROS stack does stops
+it. robot/README.md says more.
 
 examples:
-  lira ros2 --connect rosbot:7447 --cmd-vel twist_stamped --lidar-yaw 180
+  lira ros2 --look --connect rosbot:7447        what is there, on which keys, and the words for it
+  lira ros2 --connect rosbot:7447 --lidar-yaw 180
+  lira ros2 --rmw --connect rosbot:7447 --domain 3
   lira ros2 --connect rosbot:7447 --namespace robot1 --topic odom=odometry/filtered --topic cmd_vel=base/cmd_vel
   lira drive lidar-expert
 """
@@ -15,16 +18,21 @@ import math
 import sys
 import threading
 import time
+from collections.abc import Mapping
 from contextlib import closing
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
-from lira.hal.errors import ConfigError
-from lira.tools.options import add_profile, add_server
+from lira.hal.errors import BusError, ConfigError
+from lira.tools.options import add_profile, add_ros_domain, add_server
 
 if TYPE_CHECKING:
     from lira.hal.bus.bus import Bus
+    from lira.hal.ros_graph.node import RosNode
 
 LINK_S = 3.0
+LISTEN_S = 3.0
+NODE = "lira"
 LOOK_S = 0.05
 NOTHING_THERE = (
     "nothing of ours runs on this robot: if this machine, this program or the radio fails, only the robot's own "
@@ -35,7 +43,7 @@ NO_TIME = (
     "say --cmd-vel twist_stamped"
 )
 ONE_LINK = (
-    "there is one link to the bridge: after a gap of the radio TCP delivers what queued up, and the robot may obey it "
+    "there is one link to the robot: after a gap of the radio TCP delivers what queued up, and the robot may obey it "
     "late (robot/README.md says how the bridge listens for datagrams, too)"
 )
 
@@ -43,13 +51,15 @@ ONE_LINK = (
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
     add = parser.add_argument
-    add("--connect", required=True, metavar="HOST:PORT", help="where the bridge listens")
-    add("--namespace", default="", help="the bridge's namespace: what its keys begin with (default: none)")
+    add("--connect", required=True, metavar="HOST:PORT", help="where the bridge listens, or rmw_zenoh's router")
+    add("--look", action="store_true", help="only list what comes there, and print the words that drive it")
+    add("--rmw", action="store_true", help="its ROS runs rmw_zenoh, and no bridge is needed")
+    add_ros_domain(parser, "with --rmw: the robot's ROS_DOMAIN_ID")
+    add("--namespace", default="", help="namespace that the names of its topics begin with (default: none)")
     add(
         "--cmd-vel",
         choices=("twist", "twist_stamped"),
-        default="twist",
-        help="type of the robot's cmd_vel: newer controllers want TwistStamped (default: %(default)s)",
+        help="type of the robot's cmd_vel; newer controllers want TwistStamped (default: what it says that it hears)",
     )
     add(
         "--topic",
@@ -64,26 +74,82 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Serve until told to stop."""
+    """Serve until told to stop, or say what there is."""
+    if args.look:
+        from lira.hal.ros_graph.look import look
+        from lira.tools.ros2.page import page
+
+        print("\n".join(page(look(args.connect, LISTEN_S), args.connect)))
+        return 0
+
     from lira.hal.bus.bus import Bus
     from lira.hal.profile import load_profile
     from lira.hal.server.serve import serve
     from lira.robot.ros2.robot import Interface, Ros2Robot
+    from lira.robot.ros2.transport import BRIDGE, RMW
+    from lira.tools.launch.notify import Notifier
     from lira.tools.output.troubles import watch
 
-    interface = Interface(topics(args.topic), args.cmd_vel == "twist_stamped", math.radians(args.lidar_yaw))
+    notifier = Notifier.from_environment()
+    names = topics(args.topic)
+    Interface(names)
     profile = load_profile(args.profile)
-    with closing(Bus(args.name, connect=args.connect, prefix=args.namespace.strip("/"))) as far:
-        robot = Ros2Robot(profile, far, interface)
+    wanted = commanded(args, names.get("cmd_vel", "cmd_vel"))
+    interface = Interface(names, wanted.stamped, math.radians(args.lidar_yaw))
+    with closing(open_far(args, wanted)) as far:
+        robot = Ros2Robot(profile, far, interface, RMW if args.rmw else BRIDGE)
 
         def ready(_: Bus, stop: threading.Event) -> None:
-            print(f"robot '{args.name}' (ROS 2 at {args.connect}) serves on {args.listen}", flush=True)
+            words = f"robot '{args.name}' (ROS 2 at {args.connect}) serves on {args.listen}"
+            print(words, flush=True)
+            notifier.ready(words)
             for warning in warnings(far, stamped=interface.stamped):
                 print(f"warning: {warning}", file=sys.stderr, flush=True)
             watch(robot, stop)
 
-        serve(robot, args.name, args.listen, insecure=args.insecure, ready=ready)
+        serve(robot, args.name, args.listen, insecure=args.insecure, ready=ready, alive=notifier.alive)
     return 0
+
+
+@dataclass(frozen=True)
+class Wanted:
+    """How a robot wants its commands: with a stamp or without, and how it hashes the type."""
+
+    stamped: bool = False
+    hashes: Mapping[str, str] = field(default_factory=dict)
+
+
+def commanded(args: argparse.Namespace, topic: str) -> Wanted:
+    """Look what the robot's own nodes say that they listen to. Raises `ConfigError` if that is not what is asked for.
+
+    A bridge that is not there yet, or lets no token through, says nothing.
+    """
+    from lira.hal.ros_graph.look import look
+    from lira.tools.ros2.sight import CMD_VEL_WORD, heard_commands
+
+    try:
+        sight = look(args.connect)
+    except BusError:
+        if args.rmw:
+            raise
+        return Wanted(args.cmd_vel == "twist_stamped")
+    name = "/".join(part for part in (args.namespace.strip("/"), topic.strip("/")) if part)
+    hashes = heard_commands(sight, args.domain if args.rmw else None, name)
+    words = sorted(CMD_VEL_WORD[kind] for kind in hashes)
+    if args.cmd_vel and words and args.cmd_vel not in words:
+        raise ConfigError(f"the robot listens to no {args.cmd_vel} on '{name}'", f"Say --cmd-vel {words[0]}.")
+    word = args.cmd_vel or (words[-1] if words else "twist")  # of both, the one with a stamp
+    return Wanted(word == "twist_stamped", hashes)
+
+
+def open_far(args: argparse.Namespace, wanted: Wanted) -> "Bus | RosNode":
+    """Open what carries the robot's topics."""
+    from lira.hal.bus.bus import Bus
+    from lira.hal.ros_graph.node import RosNode
+
+    if not args.rmw:
+        return Bus(args.name, connect=args.connect, prefix=args.namespace.strip("/"))
+    return RosNode(NODE, connect=args.connect, domain=args.domain, namespace=args.namespace, hashes=wanted.hashes)
 
 
 def topics(words: list[str]) -> dict[str, str]:
@@ -97,7 +163,7 @@ def topics(words: list[str]) -> dict[str, str]:
     return found
 
 
-def warnings(far: "Bus", *, stamped: bool) -> list[str]:
+def warnings(far: "Bus | RosNode", *, stamped: bool) -> list[str]:
     """What is missing beside a robot that runs our server."""
     from lira.hal.bus.bus import LINKS_PER_PEER
 

@@ -51,16 +51,20 @@ def run(args: argparse.Namespace) -> int:
 
     from lira.tools.joystick.bridge import Bridge
     from lira.tools.joystick.known_pads import PadMemory, state_file
+    from lira.tools.launch.notify import Notifier
     from lira.tools.operator.beside import beside
 
+    notifier = Notifier.from_environment()
     with beside(args.name, args.connect) as robot:
         client = robot.client(say)
         if client is None:
             raise ConfigError(f"'{args.name}' waits for each command: no hand drives it", "Run it without --lockstep.")
         finder = Finder(mapping, args.device)
         bridge = Bridge(client, finder, PadMemory(state_file(), say), say, finder.advice)
-        say(f"joystick drives '{args.name}' at {args.connect}; stop with Ctrl-C")
-        bridge.run(robot.stop)
+        words = f"joystick drives '{args.name}' at {args.connect}"
+        say(f"{words}; stop with Ctrl-C")
+        notifier.ready(words)
+        bridge.run(robot.stop, notifier.alive)
     return 0
 
 

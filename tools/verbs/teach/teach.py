@@ -27,10 +27,10 @@ from typing import TYPE_CHECKING
 
 from lira.hal.bus.endpoint import DEFAULT_ENDPOINT, DEFAULT_ROBOT
 from lira.hal.errors import ConfigError
-from lira.tools.options import DEFAULT, add_expert, add_layout, add_seed, natural
+from lira.tools.options import DEFAULT, add_expert, add_layout, add_record, add_seed, natural
 
 if TYPE_CHECKING:
-    from lira.tools.runs.teach import Plan
+    from lira.tools.runs.plan import Plan
 
 SCRIPT_SPEED = 2.5
 SLOWEST, FASTEST = 0.4, 5.0  # of a person's; slower, a screen would take what the twin says for old
@@ -84,6 +84,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     add("--shown-as", default="", help=argparse.SUPPRESS)  # in a study: the letter of a method that is not to be known
     add("--run", type=Path, metavar="DIR", help="folder of the session; one that is there goes on (default: a new one)")
+    add_record(parser)
 
 
 def run(args: argparse.Namespace) -> int:
@@ -122,7 +123,7 @@ def plan_of(args: argparse.Namespace) -> "Plan":
 
     from lira.fusion.methods.presets import method_named
     from lira.fusion.methods.syllabus import THESIS
-    from lira.tools.runs.teach import Plan
+    from lira.tools.runs.plan import Plan
 
     preset = method_named(args.method)
     if not preset.approach.learns:
@@ -145,23 +146,18 @@ def plan_of(args: argparse.Namespace) -> "Plan":
 @contextlib.contextmanager
 def robot_of(args: argparse.Namespace) -> Iterator[None]:
     """The robot that is there, or a twin for as long as the session lasts. Sets `args.connect`, for a script a name."""
-    from lira.fusion.experts.tasks import TASKS, task_of
-    from lira.sim_backend.catalogue import load_world
-    from lira.sim_backend.scenes.opening import quickest
-    from lira.tools.launch.launch import direct, running
+    from lira.tools.launch.launch import direct, running, twin_words
     from lira.tools.launch.processes import free_port
     from lira.tools.runs.reach import say
 
     if args.connect is not None:
         yield
         return
-    place = load_world(args.world)
     if args.person != "hand":
         args.listen = f"127.0.0.1:{free_port()}"
         args.name = f"taught_{args.listen.rpartition(':')[2]}"
-    profile = args.profile or TASKS[task_of(place.name)].profile
-    twin = ["--world", args.world, "--profile", profile, "--renderer", quickest(place)]
-    twin += ["--layout", str(args.layout), "--seed", str(args.seed), "--speed", str(args.speed)]
+    twin = twin_words(args.world, args.profile, args.seed)
+    twin += ["--layout", str(args.layout), "--speed", str(args.speed)]
     args.connect = args.listen
     with running(direct(args.name, args.listen, twin, lockstep=False), args.run, say):
         yield

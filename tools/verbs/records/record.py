@@ -1,0 +1,83 @@
+"""Record everything on a robot's bus: sensors, who drives, decisions, what a person asks, as an MCAP recording.
+
+`lira fusion` and `lira demo` start one for each run. It hears what anybody may hear on the bus; commands go to the
+robot alone, so what reached the wheels is in `cmd_vel/applied`. ROS 2, Foxglove and Rerun open it as it is; for a robot
+far away it is best run on the robot itself, for the radio's sake.
+
+examples:
+  lira record                                       until Ctrl-C, into recordings/<date-time>
+  lira record --connect 192.168.1.20:7447 --out runs/mine/recording
+  lira record --recover recordings/20261127-120000  mend what was cut off
+
+exit status: 0 if all was recorded, 2 if the disk took no more or something else went wrong
+"""
+
+import argparse
+import os
+import shlex
+import sys
+from datetime import datetime
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from lira.tools.options import DEFAULT, add_client, natural
+
+if TYPE_CHECKING:
+    from threading import Event
+
+NICENESS = 5
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the arguments."""
+    add_client(parser)
+    add = parser.add_argument
+    add("--out", type=Path, metavar="DIR", help="folder of the recording (default: recordings/<date-time>)")
+    add("--split", type=natural, default=2000, metavar="MB", help=f"begin another file after so much {DEFAULT}")
+    add("--memory", type=natural, default=64, metavar="MB", help=f"what may wait for a slow disk {DEFAULT}")
+    add("--recover", type=Path, metavar="FILE", help="instead: give what was cut off an index again")
+
+
+def run(args: argparse.Namespace) -> int:
+    """Record until told to stop."""
+    from lira.hal.server.server import stop_on_signal
+    from lira.tools.runs.reach import say
+
+    if args.recover is not None:
+        from lira.tools.recording.recover import recover
+
+        for line in recover(args.recover):
+            say(line)
+        return 0
+    with stop_on_signal() as stop:
+        return record(args, stop)
+
+
+def record(args: argparse.Namespace, stop: "Event") -> int:
+    """Record until `stop` is set, or the disk takes no more."""
+    from lira.hal.bus.bus import Bus
+    from lira.tools.cli import version
+    from lira.tools.launch.lifetime import CLOSE_S
+    from lira.tools.launch.notify import Notifier
+    from lira.tools.recording.beside import READY
+    from lira.tools.recording.recorder import Recorder, listen
+    from lira.tools.recording.writer import RecordingWriter
+    from lira.tools.runs.reach import say
+
+    folder = args.out or Path("recordings") / f"{datetime.now():%Y%m%d-%H%M%S}"
+    notifier = Notifier.from_environment()
+    bus = Bus(args.name, connect=args.connect, watch=True)
+    try:
+        head, tap, heard = listen(bus, version(), shlex.join(["lira", *sys.argv[1:]]), stop)
+        writer = RecordingWriter(folder, head, split_bytes=args.split * 2**20)
+        os.nice(NICENESS)
+        recorder = Recorder(tap, writer, head, say, most_bytes=args.memory * 2**20)
+        words = f"{READY}{args.name}' at {args.connect} into {folder}"
+        say(words)
+        notifier.ready(words)
+        recorder.run(stop, heard, notifier.alive)
+    finally:
+        bus.close(CLOSE_S)
+    lost = recorder.lost.total()
+    say(f"recorded {recorder.count} messages, {writer.size_bytes / 1e6:.1f} MB, lost {lost}: {folder}")
+    return 0
