@@ -6,6 +6,7 @@ from typing import Self
 
 import pygame
 
+SMALLEST = 14  # pixels; smaller letters cannot be read
 Colour = tuple[int, int, int]
 Point = tuple[float, float]
 Box = pygame.Rect | tuple[float, float, float, float]
@@ -72,7 +73,7 @@ class Canvas:
         return y
 
     def _font(self, size: int) -> pygame.font.Font:
-        return _font(max(1, round(size * self._scale)))
+        return _font(max(SMALLEST, round(size * self._scale)))
 
     def _at(self, point: Point) -> tuple[int, int]:
         x, y = point

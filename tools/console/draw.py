@@ -181,7 +181,7 @@ def draw_counts(canvas: Canvas, box: pygame.Rect, view: View) -> None:
     pairs = (
         ("human labels", labels.stored_human),
         ("expert labels", labels.stored_expert),
-        ("demonstration", labels.demonstration),
+        ("shown first", labels.demonstration),
         ("interventions", d.interventions),
         ("calls", d.calls),
         ("training steps", d.training_steps),
