@@ -42,7 +42,7 @@ GROUPS = {
         "joystick": "drive by hand: a gamepad on this machine, straight to the robot",
         "console": "watch the robot learn on a screen",
         "web": "watch, teach and drive the robot from a page in the browser",
-        "view": "show the robot in Foxglove, and its numbers to Prometheus; it only looks",
+        "view": "show the robot in Foxglove or Rerun, and its numbers to Prometheus; it only looks",
         "world": "draw a world from above and as the camera sees it",
     },
     ("records", "Records"): {
@@ -60,6 +60,7 @@ GROUPS = {
         "status": "what is up: processes, rates, ages, link, who drives",
         "logs": "what the processes that are up have written",
         "down": "stop all that is up, drivers first and the robot last",
+        "deploy": "run them from the start of the machine: systemd units, keys and rules, here or on the robot",
         "keys": "make the keys that say who may drive a robot, and encrypt the bus",
     },
     ("checks", "Checks"): {
