@@ -21,7 +21,7 @@ BENCHES = {
     "train": "one training step, beside a plain PyTorch loop, and what it does to the control loop",
     "drivers": "what the drivers need of a core, how old a published scan is, what the lidar's line loses in --minutes",
     "step": "where the time of one decision step goes, and of a whole run on line-obstacles",
-    "record": "control beside a recorder and without one, for --minutes each; the recorder's share of a core, and losses",
+    "record": "control beside a recorder and without, for --minutes each; the recorder's share of a core, and losses",
     "log": "a million labels: the log written, opened and learned from, and the memory that takes",
     "preprocess": "a JPEG of 640x480 to 32x32 gray, beside full decoding and resizing",
     "fuzz": "garbage to every decoder that faces the bus",
