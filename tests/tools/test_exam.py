@@ -31,7 +31,7 @@ def stand(seen):
 def files_of_the_page():
     """The files that the page shows, by name: each after a line that begins with its name."""
     found = re.findall(r"^`([\w./]+)`.*?\n```\w+\n(.*?)^```", PAGE, flags=re.MULTILINE | re.DOTALL)
-    return dict(found)
+    return {f".github/workflows/{name}" if name.endswith(".yml") else name: text for name, text in found}
 
 
 # The exam
