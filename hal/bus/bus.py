@@ -20,7 +20,7 @@ from lira.hal.bus.connection import Connection
 from lira.hal.bus.endpoint import DEFAULT_ROBOT, check_address, check_name, is_loopback
 from lira.hal.bus.expiry import Reminder
 from lira.hal.bus.keys import Keys, keys_from_environment, load_keys
-from lira.hal.bus.publisher import Publisher
+from lira.hal.bus.publisher import Attach, Publisher
 from lira.hal.bus.questions import Answer, Questions, ask_once
 from lira.hal.bus.reader import Reader, Tap
 from lira.hal.bus.topics import COMMANDS, Qos, Topic, named
@@ -99,11 +99,11 @@ class Bus:
             self.close()
             raise BusError(f"cannot open the bus at {connect}", "Check the address, and that the robot runs.")
 
-    def publisher(self, topic: Topic[M], qos: Qos | None = None) -> Publisher[M]:
-        """Declare a publisher; `qos` replaces the table's."""
+    def publisher(self, topic: Topic[M], qos: Qos | None = None, attach: Attach | None = None) -> Publisher[M]:
+        """Declare a publisher; `qos` replaces the table's, `attach` what is attached: for who speaks for others."""
         key = self._key(self._own(topic).key)
-        attach = partial(_attach, self.epoch, self._counts.setdefault(key, itertools.count(1)))
-        return Publisher(self._connection, key, topic, qos or topic.qos, attach)
+        own = partial(_attach, self.epoch, self._counts.setdefault(key, itertools.count(1)))
+        return Publisher(self._connection, key, topic, qos or topic.qos, attach or own)
 
     def put_raw(self, topic: Topic[Any], payload: bytes, attachment: bytes | None = None) -> None:
         """Send bytes as they are: for relays, recorders and tests of what a bus has to bear."""
