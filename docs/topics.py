@@ -23,7 +23,7 @@ def _row(topic: Topic[object]) -> str:
     cells = [
         f"`{topic.key}`",
         f"`{topic.ros_type}`",
-        f"{topic.rate_hz:g}",
+        f"{topic.rate_hz:g}" if topic.rate_hz else "once",
         age,
         _size(topic.max_bytes),
         _way(topic.qos),

@@ -80,6 +80,10 @@ class ControlLoop:
                 break
         self._keep_time()
 
+    def keep_silent(self) -> None:
+        """Command nothing before `arm`, not even to stand: that would arm a robot that stands for its own reasons."""
+        self._reason = Reason.NEUTRAL_FIRST
+
     def step(self, method: Method, teacher: Teacher | None = None) -> Step | None:
         """Make one decision and let its period pass. Returns None if a sensor was stale or unusable: it stops then."""
         method.update(self._robot.now())

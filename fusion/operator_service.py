@@ -52,7 +52,8 @@ class OperatorService:
 
     `restart` puts a twin's robot back to the start; None on a real floor. `snapshot` takes what is to be saved as it is
     now and returns the writing of it, which is done aside; None where nothing is learned. `session` is asked first: it
-    answers what it takes, None to the rest.
+    answers what it takes, None to the rest. Who begins `paused` arms nothing: the robot stands until a person asks it
+    to go on.
     """
 
     def __init__(
@@ -66,8 +67,9 @@ class OperatorService:
         restart: Callable[[], None] | None = None,
         snapshot: Callable[[], Job] | None = None,
         session: Callable[[OperatorRequest], Answer | None] = lambda _: None,
+        paused: bool = False,
     ) -> None:
-        self.paused = False
+        self.paused = paused
         self.episode = 0
         self._line = line
         self._boundary = Boundary()
@@ -82,6 +84,13 @@ class OperatorService:
         self._saving: Future[str] | None = None
         self._count = 0
         self._newest = (True, "")
+
+    def begin(self) -> None:
+        """Arm the robot for the first time; who begins paused says nothing to it."""
+        if self.paused:
+            self._loop.keep_silent()
+        else:
+            self._loop.arm()
 
     def serve(self) -> None:
         """Answer what was asked since the last time, and what has been saved by now."""

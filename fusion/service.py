@@ -31,16 +31,19 @@ def serve(
     layout: int = 0,
     explain: Callable[[Applied], str] = reason_alone,
     is_attended: Callable[[], bool] | None = None,
+    alive: Callable[[], None] = lambda: None,
 ) -> None:
     """Run the control loop until `stop` is set; `operator_service` answers what a person asks between two steps.
 
     Where `is_attended` is given, a method that begins by itself stands until it is true: a hand is on the controls.
 
     `say` gets a line whenever what holds the robot changes; `explain` puts into words why it stands and what to do.
+    `alive` is called with every turn of the loop.
     """
     said: Reason | None = Reason.OK
     stands = is_attended is not None and method.begins_alone
     while not stop.is_set():
+        alive()
         if loop.restarted():
             # Nothing of what was before belongs to what comes.
             method.reset()

@@ -1,7 +1,16 @@
-"""A client's estimate of the robot's clock, from the times that messages carry. Wall clocks are not trusted."""
+"""The robot's clock: how it is told on the bus, and a client's estimate of it from the times that messages carry.
 
+On the bus it counts from 1970, as ROS expects: what is added to it is measured once, when the robot starts, so it still
+runs evenly and never back, whatever is done to the time of day. Clients trust no wall clock.
+"""
+
+import time
 from collections import deque
+from collections.abc import Callable
 
+# A clock that shows this much counts from 1970 already: no machine is up for thirty years.
+COUNTS_FROM_1970_S = 1e9
+TRIES = 5
 # Long enough for one prompt message among late ones, short enough to follow a robot whose time runs slower.
 WINDOW_S = 0.25
 # An estimate of another's clock lags. A stamp further ahead than this is not honest, and could keep what is old alive.
@@ -11,6 +20,35 @@ LEAP_S = 0.5  # a clock that runs as ours or slower never leaps; a link that was
 # between its words. Both take longer to come up.
 SILENT_S = 0.3
 HEAL_S = 1.0  # if nothing else is heard for so long, it was no mistake: the robot's clock was set
+
+
+def unix_offset_s(now: Callable[[], float], unix: Callable[[], float] = time.time) -> float:
+    """Return what has to be added to a robot's clock to count from 1970: 0 for one that does already.
+
+    Of a few tries the one counts in which the least time passed between two looks.
+    """
+    if now() > COUNTS_FROM_1970_S:
+        return 0.0
+    tries = []
+    for _ in range(TRIES):
+        before_s, unix_s, after_s = now(), unix(), now()
+        tries.append((after_s - before_s, unix_s - (before_s + after_s) / 2))
+    return min(tries)[1]
+
+
+class TimeBase:
+    """What a session adds to its own times when it tells them, and takes off those that it hears: 0 but for a robot."""
+
+    def __init__(self) -> None:
+        self.offset_s = 0.0
+
+    @property
+    def offset_ns(self) -> int:
+        """The same in nanoseconds."""
+        return round(self.offset_s * 1e9)
+
+
+OWN_TIME = TimeBase()
 
 
 class ClockEstimate:

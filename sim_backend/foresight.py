@@ -67,17 +67,20 @@ class Foresight:
         steps: int,
         period_s: float,
         ends: Callable[[CourseState], bool] = lambda _: False,
+        first: Action | None = None,
     ) -> list[CourseState]:
         """Let `policy` drive from `state`: the state after each of `steps`.
 
-        The last is a collision, a loss, or the first that `ends` it: what comes after is not looked at.
+        The last is a collision, a loss, or the first that `ends` it: what comes after is not looked at. `first` is what
+        the policy does at `state`, if that is known: nothing is rendered for it then.
         """
         twin, base = self._twin, self._profile.base
         twin.open()
         twin.place(self.course.layout.seed, state)
         states: list[CourseState] = []
         for _ in range(steps):
-            linear, angular = policy(twin.read())
+            linear, angular = policy(twin.read()) if first is None else first
+            first = None
             twist = Twist(linear * base.max_linear_m_s, angular * base.max_angular_rad_s)
             twin.drive(Command(twist, twin.now()))
             twin.wait(twin.now() + period_s)

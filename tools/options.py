@@ -99,6 +99,15 @@ def add_shield(parser: argparse.ArgumentParser, who: str) -> None:
     )
 
 
+def add_paused(parser: argparse.ArgumentParser) -> None:
+    """Declare `--paused`."""
+    parser.add_argument(
+        "--paused",
+        action="store_true",
+        help="begin paused: the robot stands until a person asks to go on (P on a screen, square on the pad)",
+    )
+
+
 def add_expert(parser: argparse.ArgumentParser) -> None:
     """Declare `--expert`."""
     parser.add_argument(

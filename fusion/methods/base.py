@@ -16,6 +16,21 @@ STAND: Action = (0.0, 0.0)
 
 
 @dataclass(frozen=True, slots=True)
+class AsTaught:
+    """What a policy under training does now; equal to what it does at another moment if it has learned nothing since.
+
+    `training_steps` is how often it had learned.
+    """
+
+    act: Policy
+    training_steps: int
+
+    def __call__(self, features: Features) -> Action:
+        """Act on what is seen."""
+        return self.act(features)
+
+
+@dataclass(frozen=True, slots=True)
 class Expert:
     """A named black box. `cruise` is its measured action where its sensor shows nothing to react to."""
 
@@ -122,8 +137,12 @@ class Method(ABC):
         return Lesson(Choice(Driver.HUMAN, human, label=human), stored)
 
     def policy(self, driver: str) -> Policy:
-        """Return the policy behind a driver's name, to look ahead with. Raises `KeyError` for the human."""
-        return {**{expert.name: expert.act for expert in self.experts}, Driver.NOVICE: self.novice.act}[driver]
+        """Return the policy behind a driver's name, to look ahead with. Raises `KeyError` for the human.
+
+        One that equals that of another moment does the same wherever it sees the same.
+        """
+        novice: Policy = AsTaught(self.novice.act, self.novice.training_steps)
+        return {**{expert.name: expert.act for expert in self.experts}, Driver.NOVICE: novice}[driver]
 
     def alone(self, phase: Phase) -> "Method":
         """Return what drives without a teacher, to be proven or on unseen layouts: the novice, if anybody learns."""

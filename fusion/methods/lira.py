@@ -127,8 +127,11 @@ class LiraSpf(Method):
     def policy(self, driver: str) -> Policy:
         """The policy behind a driver's name."""
         if driver == Driver.MEAN:
-            return lambda features: mean([expert.act(features) for expert in self.experts])
+            return self._mean_of_all
         return super().policy(driver)
+
+    def _mean_of_all(self, features: Features) -> Action:
+        return mean([expert.act(features) for expert in self.experts])
 
     @property
     def _theta(self) -> float:

@@ -15,7 +15,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 from lira.fusion.learning.novice import Novice
-from lira.fusion.methods.base import Choice, Expert, Lesson, Method, Policy, Proposal, Settled
+from lira.fusion.methods.base import AsTaught, Choice, Expert, Lesson, Method, Policy, Proposal, Settled
 from lira.fusion.methods.context import Context, MethodSettings
 from lira.fusion.methods.lira import LiraSettings, LiraSpf, choose
 from lira.fusion.methods.stop_and_ask import Doubtful
@@ -120,7 +120,9 @@ class LiraPlus(LiraSpf):
 
     def policy(self, driver: str) -> Policy:
         """The policy behind a driver's name: a novice that practises drives as it does alone."""
-        return self.novice.alone if driver == Driver.NOVICE and self._practises else super().policy(driver)
+        if driver == Driver.NOVICE and self._practises:
+            return AsTaught(self.novice.alone, self.novice.training_steps)
+        return super().policy(driver)
 
     @property
     def _practises(self) -> bool:

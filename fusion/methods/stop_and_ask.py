@@ -4,7 +4,7 @@ from collections.abc import Callable
 
 from lira.fusion.methods.base import STAND, Choice, Method, Policy, Proposal
 from lira.fusion.preprocess import Features
-from lira.hal.messages import Call, Driver
+from lira.hal.messages import Action, Call, Driver
 
 
 class Doubtful(Method):
@@ -23,4 +23,7 @@ class Doubtful(Method):
 
     def policy(self, driver: str) -> Policy:
         """What would drive from here on, standing included."""
-        return dict[str, Policy]({Driver.NOVICE: lambda features: self.propose(features).choice.action})[driver]
+        return dict[str, Policy]({Driver.NOVICE: self._act})[driver]
+
+    def _act(self, features: Features) -> Action:
+        return self.propose(features).choice.action

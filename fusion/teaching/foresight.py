@@ -45,8 +45,12 @@ class Foresight(Protocol):
         steps: int,
         period_s: float,
         ends: Callable[[CourseState], bool],
+        first: Action | None = None,
     ) -> list[CourseState]:
-        """Let a policy drive from `state`, with rendered sensors; ends early at a collision, lost line, or as told."""
+        """Let a policy drive from `state`, with rendered sensors; ends early at a collision, lost line, or as told.
+
+        `first` is what it does there, if that is known already.
+        """
 
     def imagine(self, state: CourseState, actions: NDArray[np.float64], period_s: float) -> Futures:
         """Follow action sequences [N, T, 2] from `state`, without sensors."""

@@ -7,6 +7,7 @@ reacts sooner.
 
 import math
 from collections.abc import Callable, Mapping
+from dataclasses import dataclass
 from types import MappingProxyType
 from typing import Annotated, Literal
 
@@ -15,7 +16,7 @@ from msgspec import Meta
 from numpy.typing import NDArray
 
 from lira.fusion.methods.base import STAND, Policy, Proposal
-from lira.fusion.preprocess import Preprocessor
+from lira.fusion.preprocess import Features, Preprocessor
 from lira.fusion.teaching.foresight import Foresight
 from lira.fusion.teaching.planner import COMFORT_M, Planner
 from lira.hal.config import Table
@@ -50,12 +51,35 @@ class TeacherSettings(Table, frozen=True):
     notices_s: float = 3.0  # a danger that was missed is seen so much later, if it lasts: a robot that stands and asks
 
 
+AS_FORESEEN = 1e-6  # metres, radians and so on: a robot that is so near to where it was foreseen is there
 NOBODY: Mapping[str, Policy] = MappingProxyType({})
 
 SKILLED = TeacherSettings()
 PERFECT = TeacherSettings(delay_s=0.0, called_delay_s=0.0, gain_sigma=0.0, wrong_direction=0.0, missed=0.0)
 UNSKILLED = TeacherSettings(delay_s=1.0, called_delay_s=0.6, gain_sigma=0.4, wrong_direction=0.15, missed=0.1)
 TEACHERS = {"scripted": SKILLED, "perfect": PERFECT, "unskilled": UNSKILLED}
+
+
+@dataclass(frozen=True, slots=True)
+class Outlook:
+    """How a policy was foreseen to drive, state after state."""
+
+    policy: Policy
+    drive: list[CourseState]
+
+    def holds(self, state: CourseState, policy: Policy) -> bool:
+        """Whether its first state has come true and the same policy is to drive on, none the wiser."""
+        return policy == self.policy and _same_place(state, self.drive[0])
+
+
+def _same_place(one: CourseState, other: CourseState) -> bool:
+    """Whether a robot stands and moves in both states alike, but for rounding."""
+    gaps = (
+        *(one.x_m - other.x_m, one.y_m - other.y_m, math.remainder(one.yaw_rad - other.yaw_rad, math.tau)),
+        *(one.linear_m_s - other.linear_m_s, one.angular_rad_s - other.angular_rad_s),
+        0.0 if math.isnan(one.progress_m) else one.progress_m - other.progress_m,
+    )
+    return max(map(abs, gaps)) < AS_FORESEEN
 
 
 class ScriptedTeacher:
@@ -90,6 +114,7 @@ class ScriptedTeacher:
         self._safe = 0
         self._took_over_s = -math.inf
         self._gain, self._wrong_steps = 1.0, 0
+        self._outlook: Outlook | None = None
         self._planner.reset()
 
     def act(
@@ -104,7 +129,7 @@ class ScriptedTeacher:
             gives_up = state.stamp_s >= self._took_over_s + self._settings.longest_s
             self._driving = self._safe < self._settings.safe_steps and not proposal.relieves and not gives_up
         elif self._reacts(state.stamp_s, danger, alert=_asks(proposal)):
-            name = self._pick(state, offers)
+            name = self._pick(state, proposal.features, offers)
             if name is not None:
                 self._react_at_s = None
                 return name
@@ -113,25 +138,48 @@ class ScriptedTeacher:
             return None
         return self._with_faults(self._planner.plan(state))
 
-    def _pick(self, state: CourseState, offers: Mapping[str, Policy]) -> str | None:
+    def _pick(self, state: CourseState, seen: Features, offers: Mapping[str, Policy]) -> str | None:
         """An expert that does well from here on, if one can be given control; at times a wrong one."""
         if not offers:
             return None
         if self._random.random() < self._settings.wrong_direction:
             return list(offers)[int(self._random.integers(len(offers)))]
-        safe = (name for name, policy in offers.items() if not self._goes_wrong(state, policy))
-        return next(safe, None)
+        for name, policy in offers.items():
+            if not self._goes_wrong(state, self._foresee(state, seen, policy, self._steps)):
+                return name
+        return None
 
     def _danger(self, state: CourseState, proposal: Proposal, policy: Policy) -> bool:
-        """Whether the policy goes wrong; not looked at where no policy could."""
-        slow = proposal.choice.action[0] < self._settings.stall
-        if self._settings.follow_line and not slow and not self._within_reach(state):
+        """Whether the policy goes wrong; it does not where no policy could."""
+        if not self._goes_wrong(state, self._look_ahead(state, proposal.features, policy)):
             return False
-        return self._goes_wrong(state, policy)
+        slow = proposal.choice.action[0] < self._settings.stall
+        return not self._settings.follow_line or slow or self._within_reach(state)
 
-    def _goes_wrong(self, state: CourseState, policy: Policy) -> bool:
-        """Whether the policy would hit something, lose the line, turn back or stand, at its full speed."""
-        drive = self._foresight.rollout(state, self._seeing(policy), self._steps, self._period_s, self._unsafe)
+    def _look_ahead(self, state: CourseState, seen: Features, policy: Policy) -> list[CourseState]:
+        """Foresee what the policy would do, beginning with what was foreseen a step ago if it has come true."""
+        drive: list[CourseState] = []
+        if self._outlook is not None and self._outlook.holds(state, policy):
+            drive = self._outlook.drive[1:]
+        missing = self._steps - len(drive)
+        if not drive:
+            drive = self._foresee(state, seen, policy, missing)
+        elif not self._ends(drive[-1]):
+            drive += self._foresee(drive[-1], None, policy, missing)
+        self._outlook = Outlook(policy, drive)
+        return drive
+
+    def _foresee(self, state: CourseState, seen: Features | None, policy: Policy, steps: int) -> list[CourseState]:
+        """Let the policy drive in the second twin; `seen` is what is seen at `state`, where the robot is there."""
+        first = None if seen is None else policy(seen)
+        return self._foresight.rollout(state, self._seeing(policy), steps, self._period_s, self._unsafe, first)
+
+    def _ends(self, state: CourseState) -> bool:
+        """Whether nothing is foreseen after a state."""
+        return state.lost or self._unsafe(state)
+
+    def _goes_wrong(self, state: CourseState, drive: list[CourseState]) -> bool:
+        """Whether a drive from `state` hits something, loses the line, turns back or stands, at its full speed."""
         if self._unsafe(drive[-1]):
             return True
         aimless = self._turns_back(state, drive) if self._settings.follow_line else self._wanders(state, drive)

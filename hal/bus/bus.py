@@ -7,7 +7,7 @@ import itertools
 import secrets
 import time
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from functools import partial
 from typing import Any, TypeVar
 
@@ -25,6 +25,7 @@ from lira.hal.bus.questions import Answer, Questions, ask_once
 from lira.hal.bus.reader import Reader, Tap
 from lira.hal.bus.topics import COMMANDS, Qos, Topic, named
 from lira.hal.bus.zenoh_session import open_session
+from lira.hal.clock import TimeBase, unix_offset_s
 from lira.hal.errors import BusError, ConfigError
 
 M = TypeVar("M")
@@ -72,6 +73,7 @@ class Bus:
         self.epoch = secrets.randbits(64)
         self.refusals = refusals or Refusals()
         self.boundary = Boundary()
+        self._time_base = TimeBase()
         self._counts: dict[str, Iterator[int]] = {}  # what was sent, by key: they grow whoever sends
         keys = keys or keys_from_environment()
         self.encrypted = keys is not None
@@ -99,11 +101,20 @@ class Bus:
             self.close()
             raise BusError(f"cannot open the bus at {connect}", "Check the address, and that the robot runs.")
 
+    def count_from_1970(self, now: Callable[[], float]) -> None:
+        """Tell and hear all times on the clock `now` as seconds since 1970; measured once, now."""
+        self._time_base.offset_s = unix_offset_s(now)
+
+    @property
+    def offset_s(self) -> float:
+        """What times on the bus are ahead of those of this process."""
+        return self._time_base.offset_s
+
     def publisher(self, topic: Topic[M], qos: Qos | None = None, attach: Attach | None = None) -> Publisher[M]:
         """Declare a publisher; `qos` replaces the table's, `attach` what is attached: for who speaks for others."""
         key = self._key(self._own(topic).key)
-        own = partial(_attach, self.epoch, self._counts.setdefault(key, itertools.count(1)))
-        return Publisher(self._connection, key, topic, qos or topic.qos, attach or own)
+        own = partial(_attach, self.epoch, self._counts.setdefault(key, itertools.count(1)), self._time_base)
+        return Publisher(self._connection, key, topic, qos or topic.qos, attach or own, self._time_base)
 
     def put_raw(self, topic: Topic[Any], payload: bytes, attachment: bytes | None = None) -> None:
         """Send bytes as they are: for relays, recorders and tests of what a bus has to bear."""
@@ -117,7 +128,7 @@ class Bus:
 
     def reader(self, topic: Topic[M], depth: int = 1) -> Reader[M]:
         """Declare a reader that keeps the newest `depth` messages between polls."""
-        return Reader(self._connection, self._key(topic.key), topic, depth, self.boundary)
+        return Reader(self._connection, self._key(topic.key), topic, depth, self.boundary, self._time_base)
 
     def tap(self) -> Tap:
         """Hear everything that this session may hear, as it came."""
@@ -202,6 +213,15 @@ class Bus:
         return f"{self._prefix}/{key}" if self._prefix else key
 
 
-def _attach(epoch: int, count: Iterator[int], time_s: float, seq: int | None, answers: int, *, released: bool) -> bytes:
+def _attach(
+    epoch: int,
+    count: Iterator[int],
+    base: TimeBase,
+    time_s: float,
+    seq: int | None,
+    answers: int,
+    *,
+    released: bool,
+) -> bytes:
     number = next(count) if seq is None else seq
-    return Attachment(epoch, number, round(time_s * 1e9), answers, released).to_bytes()
+    return Attachment(epoch, number, round(time_s * 1e9) + base.offset_ns, answers, released).to_bytes()

@@ -1,5 +1,6 @@
 """What puts messages on the bus, each with its attachment."""
 
+from dataclasses import replace
 from typing import Any, Generic, Protocol, TypeVar
 
 import zenoh
@@ -7,10 +8,17 @@ from zenoh import ext
 
 from lira.hal.bus.connection import Connection
 from lira.hal.bus.topics import Qos, Topic
+from lira.hal.clock import OWN_TIME, TimeBase
 from lira.hal.errors import BusError
 from lira.hal.messages.codec import encode
 
 M = TypeVar("M")
+
+
+def shifted(message: Any, offset_s: float) -> Any:
+    """Return a message with its stamp, if it has one, moved by so much."""
+    stamp_s = getattr(message, "stamp_s", None) if offset_s else None
+    return message if stamp_s is None else replace(message, stamp_s=stamp_s + offset_s)
 
 
 class Attach(Protocol):
@@ -21,14 +29,17 @@ class Attach(Protocol):
 
 
 class Publisher(Generic[M]):
-    """Publishes a topic on one key, each message with what `attach` makes."""
+    """Publishes a topic on one key, each message with what `attach` makes, its stamp told by the session's `base`."""
 
-    def __init__(self, connection: Connection, key: str, topic: Topic[M], qos: Qos, attach: Attach) -> None:
+    def __init__(
+        self, connection: Connection, key: str, topic: Topic[M], qos: Qos, attach: Attach, base: TimeBase = OWN_TIME
+    ) -> None:
         self._connection = connection
         self._key = key
         self._qos = qos
         self._encoding = zenoh.Encoding.APPLICATION_CDR.with_schema(topic.ros_type)
         self._attach = attach
+        self._base = base
         self._kept: tuple[bytes, bytes] | None = None
         self._publisher = connection.declare(self._anew)
 
@@ -44,7 +55,8 @@ class Publisher(Generic[M]):
 
         Raises `BusError` when the session is closed, `CodecError` for what ROS cannot hold.
         """
-        self.put_encoded(encode(message), time_s, seq=seq, answers=answers, released=released)
+        payload = encode(shifted(message, self._base.offset_s))
+        self.put_encoded(payload, time_s, seq=seq, answers=answers, released=released)
 
     def put_encoded(
         self, payload: bytes, time_s: float, *, seq: int | None = None, answers: int = -1, released: bool = False

@@ -1,7 +1,7 @@
 """What hears a topic, or all of them as they come: polled, so that no topic can stall another."""
 
 import time
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any, Generic, TypeVar
 
@@ -12,7 +12,9 @@ from zenoh.handlers import RingChannel
 from lira.hal.bus.attachment import Attachment, parse_attachment
 from lira.hal.bus.boundary import Boundary
 from lira.hal.bus.connection import Connection, Declared
+from lira.hal.bus.publisher import shifted
 from lira.hal.bus.topics import ATTACHMENT_BYTES, BY, MESSAGE_BYTES, TOPICS, Topic
+from lira.hal.clock import OWN_TIME, TimeBase
 from lira.hal.messages.codec import decode
 
 M = TypeVar("M")
@@ -47,12 +49,24 @@ class Received(Generic[M]):
 
 
 class Reader(Generic[M]):
-    """Keeps the newest `depth` of a topic. What is too long or cannot be decoded is refused at the bus's `boundary`."""
+    """Keeps the newest `depth` of a topic. What is too long or cannot be decoded is refused at the bus's `boundary`.
 
-    def __init__(self, connection: Connection, key: str, topic: Topic[M], depth: int, boundary: Boundary) -> None:
+    Times come as the session counts them itself, by its `base`.
+    """
+
+    def __init__(
+        self,
+        connection: Connection,
+        key: str,
+        topic: Topic[M],
+        depth: int,
+        boundary: Boundary,
+        base: TimeBase = OWN_TIME,
+    ) -> None:
         self._connection = connection
         self._topic = topic
         self._boundary = boundary
+        self._base = base
         self._newest: Received[M] | None = None
         self._depth = depth
         self.full = False  # the last poll took all that is kept, so older messages may have been lost
@@ -85,6 +99,9 @@ class Reader(Generic[M]):
             return None
         payload, beside = bytes(sample.payload), None if attached is None else bytes(attached)
         message, sent, arrived_s = decode(self._topic.kind, payload), parse_attachment(beside), time.monotonic()
+        if self._base.offset_s:
+            message = shifted(message, -self._base.offset_s)
+            sent = None if sent is None else replace(sent, time_ns=sent.time_ns - self._base.offset_ns)
         return Received(message, sent, arrived_s, str(sample.key_expr), self._sender(sample), payload, beside)
 
     def newest(self) -> Received[M] | None:

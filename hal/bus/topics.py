@@ -13,6 +13,7 @@ from lira.hal.messages import (
     Applied,
     BatteryState,
     Bool,
+    CameraInfo,
     Clock,
     CompressedImage,
     CourseState,
@@ -27,6 +28,8 @@ from lira.hal.messages import (
     OperatorRequest,
     Range,
     SessionState,
+    Text,
+    Transforms,
     Twist,
 )
 from lira.hal.messages.codec import fixed_bytes, ros_type_of
@@ -68,7 +71,7 @@ MESSAGE_BYTES = 4 * 2**20  # of anything at all
 
 @dataclass(frozen=True, slots=True)
 class Topic(Generic[M]):
-    """One line of the table. `max_bytes`: no payload is longer."""
+    """One line of the table. `max_bytes`: no payload is longer. A rate of 0: once, when the robot starts."""
 
     key: str
     kind: type[M]
@@ -93,6 +96,11 @@ RANGES = {
     for frame_id in ("range_fl", "range_fr", "range_rl", "range_rr")
 }
 BATTERY = Topic("battery", BatteryState, 1.0, 5.0, LATCHED)
+TF = Topic("tf", Transforms, 20.0, 0.3, URGENT)  # with each odometry
+TF_STATIC = Topic("tf_static", Transforms, 0.0, float("inf"), LATCHED, REPORT_BYTES)
+DESCRIPTION = Topic("robot_description", Text, 0.0, float("inf"), LATCHED, REPORT_BYTES)
+CAMERA_INFO = Topic("camera/color/camera_info", CameraInfo, 30.0, 0.3, REPORT)  # with each picture
+DEPTH_INFO = Topic("camera/depth/camera_info", CameraInfo, 5.0, 0.6, REPORT)
 CMD_VEL = Topic("cmd_vel", Twist, 20.0, 0.3, URGENT, fixed_bytes(STOP))
 TELEOP = Topic("cmd_vel/teleop", Twist, 30.0, 0.2, URGENT, fixed_bytes(STOP))
 APPLIED = Topic("cmd_vel/applied", Applied, 20.0, 0.3, URGENT)
@@ -115,6 +123,11 @@ TOPICS: tuple[Topic[Any], ...] = (
     IMU,
     *RANGES.values(),
     BATTERY,
+    TF,
+    TF_STATIC,
+    DESCRIPTION,
+    CAMERA_INFO,
+    DEPTH_INFO,
     CMD_VEL,
     TELEOP,
     APPLIED,

@@ -1,5 +1,6 @@
 """The values that cross modules. Messages that mirror ROS keep its field names."""
 
+from lira.hal.messages.description import CameraInfo, Text, Transform, Transforms
 from lira.hal.messages.learning import (
     Call,
     Decision,
@@ -50,6 +51,7 @@ from lira.hal.messages.values import (
     Range,
     Request,
     Seed,
+    Spread,
     WordArray,
 )
 
@@ -65,6 +67,7 @@ __all__ = [
     "Bool",
     "ByteArray",
     "Call",
+    "CameraInfo",
     "Clock",
     "Command",
     "CompressedImage",
@@ -94,7 +97,11 @@ __all__ = [
     "Seed",
     "SessionState",
     "Source",
+    "Spread",
     "Stage",
+    "Text",
+    "Transform",
+    "Transforms",
     "Twist",
     "TwistStamped",
     "WordArray",

@@ -8,10 +8,11 @@ import math
 from dataclasses import fields, is_dataclass
 from typing import Any
 
-from lira.hal.messages import Imu, LaserScan, Odometry, Twist
+from lira.hal.messages import Imu, LaserScan, Odometry, Text, Twist
 
 LARGEST = 1e10  # of any number in SI units: a time since 1970 fits
 LONGEST_TEXT = 4096
+LONGEST_MODEL = 2**18  # of a robot, as URDF
 MOST_ITEMS = 1024
 MOST_BEAMS = 16_384
 INTEGERS = range(-(2**63), 2**63)
@@ -41,13 +42,19 @@ def _check(value: Any, name: str) -> None:
         _need(len(value) <= MOST_ITEMS, name, f"{len(value)} items")
         for item in value:
             _check(item, name)
+    elif isinstance(value, Text):
+        _need(len(value.data) <= LONGEST_MODEL, name, f"{len(value.data)} characters")
     elif isinstance(value, LaserScan):
         _check_scan(value)
     elif is_dataclass(value):
         for field in fields(value):
             part = getattr(value, field.name)
             _check(part, field.name)
-            _need(not isinstance(value, _ALL_FINITE) or math.isfinite(part), field.name, part)
+            _need(
+                not (isinstance(value, _ALL_FINITE) and isinstance(part, float)) or math.isfinite(part),
+                field.name,
+                part,
+            )
 
 
 def _check_scan(scan: LaserScan) -> None:

@@ -58,3 +58,44 @@ def _jpeg_objection(data: bytes) -> str:
 def _size_objection(width: int, height: int, bytes_each: int) -> str:
     large = width * height * bytes_each > LARGEST_BYTES
     return f"{width} x {height} pixels are more than are decoded here" if large else ""
+
+
+def size_of(data: bytes) -> tuple[int, int]:
+    """Width and height of a picture, by its header. Raises `ValueError` for one without."""
+    if data.startswith(PNG_START) and len(data) >= 24:
+        return int.from_bytes(data[16:20]), int.from_bytes(data[20:24])
+    frame = _jpeg_frame(data)
+    if frame is None:
+        raise ValueError("a picture without a header")
+    return int.from_bytes(data[frame + 7 : frame + 9]), int.from_bytes(data[frame + 5 : frame + 7])
+
+
+def picture_format(data: bytes) -> str:
+    """Name a picture by what its bytes are: "png" or "jpeg"."""
+    return "png" if data.startswith(PNG_START) else "jpeg"
+
+
+def transport_format(data: bytes) -> str:
+    """Name a picture as ROS's image_transport does: what it was, how it is compressed, and to what.
+
+    Its subscriber takes what is named otherwise for eight bits of gray or colour, and a depth for a picture.
+    """
+    if data.startswith(PNG_START):
+        bits, kind = (data[24], data[25]) if len(data) > 25 else (8, 2)
+        if _PNG_CHANNELS.get(kind) == 1 and kind != 3:
+            return f"{'16UC1' if bits == 16 else 'mono8'}; png compressed"
+        return "rgb8; png compressed bgr8"
+    frame = _jpeg_frame(data)
+    gray = frame is not None and data[frame + 9] == 1
+    return "mono8; jpeg compressed" if gray else "rgb8; jpeg compressed bgr8"
+
+
+def _jpeg_frame(data: bytes) -> int | None:
+    """Where a JPEG's frame header is, None for nowhere."""
+    at = len(JPEG_START)
+    while at + 10 <= len(data) and data[at] == 0xFF:
+        marker = data[at + 1]
+        if marker in _JPEG_FRAMES:
+            return at
+        at += 1 if marker == 0xFF else 2 + int.from_bytes(data[at + 2 : at + 4])
+    return None

@@ -1,10 +1,12 @@
 """Velocities and where they lead: Twist with and without a stamp, what was applied, odometry, IMU."""
 
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
 
 from lira.hal.messages import Applied, Imu, Odometry, Reason, Source, Twist, TwistStamped
+from lira.hal.messages.description import BASE, IMU_LINK, ODOM_FRAME
 from lira.hal.messages.ros_types import Codec, Vector3, header, ros, stamp, twist_from, twist_to, yaw_from, yaw_to
 
 _Point = ros("geometry_msgs/msg/Point")
@@ -12,12 +14,20 @@ _Pose = ros("geometry_msgs/msg/Pose")
 _PoseWithCovariance = ros("geometry_msgs/msg/PoseWithCovariance")
 _TwistWithCovariance = ros("geometry_msgs/msg/TwistWithCovariance")
 
+UNMEASURED = 1e6  # variance of what nothing here measures: any value is as good
+# Nobody measures height, roll and pitch, nor how the wheels slip to the side.
+_POSE_VARIANCES = (0.0, 0.0, UNMEASURED, UNMEASURED, UNMEASURED, 0.0)
+_TWIST_VARIANCES = (0.0, 1e-4, UNMEASURED, UNMEASURED, UNMEASURED, 0.0)
+# The gyroscope integrates the yaw; roll and pitch nobody knows. Gravity is what a level floor makes of it.
+_IMU_ORIENTATION = np.diag([UNMEASURED, UNMEASURED, 0.1**2]).reshape(-1)
+_IMU_TURN = np.diag([0.05**2, 0.05**2, 0.02**2]).reshape(-1)
+_IMU_ACCELERATION = np.diag([0.2**2, 0.2**2, 0.5**2]).reshape(-1)
+GRAVITY_M_S2 = 9.80665
 _NO_COVARIANCE_36 = np.zeros(36)
-_NO_COVARIANCE_9 = np.zeros(9)
 
 
 def _stamped_to(m: TwistStamped) -> Any:
-    return ros("geometry_msgs/msg/TwistStamped")(header(m.stamp_s, "base_link"), twist_to(m.twist))
+    return ros("geometry_msgs/msg/TwistStamped")(header(m.stamp_s, BASE), twist_to(m.twist))
 
 
 def _stamped_from(message: Any) -> TwistStamped:
@@ -26,7 +36,7 @@ def _stamped_from(message: Any) -> TwistStamped:
 
 def _applied_to(m: Applied) -> Any:
     return ros("lira_msgs/msg/Applied")(
-        header(m.stamp_s, "base_link"),
+        header(m.stamp_s, BASE),
         twist_to(m.twist),
         m.source.value,
         m.reason.value,
@@ -57,12 +67,25 @@ def _applied_from(message: Any) -> Applied:
 def _odometry_to(m: Odometry) -> Any:
     pose = _Pose(_Point(m.x_m, m.y_m, 0.0), yaw_to(m.yaw_rad))
     twist = twist_to(Twist(m.linear_m_s, m.angular_rad_s))
+    pose_covariance = twist_covariance = _NO_COVARIANCE_36
+    if (spread := m.spread) is not None:
+        pose_covariance = _covariance(_POSE_VARIANCES, {0: spread.position_m, 1: spread.position_m, 5: spread.yaw_rad})
+        twist_covariance = _covariance(_TWIST_VARIANCES, {0: spread.linear_m_s, 5: spread.angular_rad_s})
     return ros("nav_msgs/msg/Odometry")(
-        header(m.stamp_s, "odom"),
-        "base_link",
-        _PoseWithCovariance(pose, _NO_COVARIANCE_36),
-        _TwistWithCovariance(twist, _NO_COVARIANCE_36),
+        header(m.stamp_s, ODOM_FRAME),
+        BASE,
+        _PoseWithCovariance(pose, pose_covariance),
+        _TwistWithCovariance(twist, twist_covariance),
     )
+
+
+def _covariance(variances: tuple[float, ...], deviations: Mapping[int, float]) -> Any:
+    """Six by six, row by row, with nothing but the diagonal: what goes together with what, nobody knows."""
+    matrix = np.zeros((len(variances), len(variances)))
+    np.fill_diagonal(matrix, variances)
+    for at, deviation in deviations.items():
+        matrix[at, at] = deviation**2
+    return matrix.reshape(-1)
 
 
 def _odometry_from(message: Any) -> Odometry:
@@ -74,13 +97,13 @@ def _odometry_from(message: Any) -> Odometry:
 
 def _imu_to(m: Imu) -> Any:
     return ros("sensor_msgs/msg/Imu")(
-        header(m.stamp_s, "imu_link"),
+        header(m.stamp_s, IMU_LINK),
         yaw_to(m.yaw_rad),
-        _NO_COVARIANCE_9,
+        _IMU_ORIENTATION,
         Vector3(0.0, 0.0, m.angular_rad_s),
-        _NO_COVARIANCE_9,
-        Vector3(m.linear_m_s2, m.lateral_m_s2, 0.0),
-        _NO_COVARIANCE_9,
+        _IMU_TURN,
+        Vector3(m.linear_m_s2, m.lateral_m_s2, GRAVITY_M_S2),
+        _IMU_ACCELERATION,
     )
 
 

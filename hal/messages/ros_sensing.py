@@ -6,7 +6,8 @@ from typing import Any
 import numpy as np
 
 from lira.hal.messages import BatteryState, CompressedImage, Image, LaserScan, Range
-from lira.hal.messages.images import objection
+from lira.hal.messages.description import BASE, LASER, OPTICAL
+from lira.hal.messages.images import objection, picture_format, transport_format
 from lira.hal.messages.ros_types import Codec, header, ros, stamp
 
 CHANNELS = {"rgb8": 3, "bgr8": 3, "rgba8": 4, "mono8": 1}
@@ -16,7 +17,7 @@ _NOTHING = np.empty(0, np.float32)
 
 def _scan_to(m: LaserScan) -> Any:
     return ros("sensor_msgs/msg/LaserScan")(
-        header(m.stamp_s, "laser"),
+        header(m.stamp_s, LASER),
         m.angle_min,
         m.angle_min + m.angle_increment * max(len(m.ranges) - 1, 0),
         m.angle_increment,
@@ -48,7 +49,7 @@ def _image_to(m: Image) -> Any:
     if data.size != height * width * CHANNELS[m.encoding]:
         raise ValueError(f"shape {m.data.shape} does not fit encoding {m.encoding}")
     step = width * CHANNELS[m.encoding]
-    return ros("sensor_msgs/msg/Image")(header(m.stamp_s, "camera"), height, width, m.encoding, False, step, data)
+    return ros("sensor_msgs/msg/Image")(header(m.stamp_s, OPTICAL), height, width, m.encoding, False, step, data)
 
 
 def _image_from(message: Any) -> Image:
@@ -61,7 +62,7 @@ def _image_from(message: Any) -> Image:
 
 def _compressed_to(m: CompressedImage) -> Any:
     return ros("sensor_msgs/msg/CompressedImage")(
-        header(m.stamp_s, "camera"), m.format, np.frombuffer(m.data, np.uint8)
+        header(m.stamp_s, OPTICAL), transport_format(m.data), np.frombuffer(m.data, np.uint8)
     )
 
 
@@ -69,7 +70,7 @@ def _compressed_from(message: Any) -> CompressedImage:
     data = message.data.tobytes()
     if why := objection(data):
         raise ValueError(why)
-    return CompressedImage(stamp(message), data, message.format)
+    return CompressedImage(stamp(message), data, picture_format(data))
 
 
 def _range_to(m: Range) -> Any:
@@ -92,7 +93,7 @@ def _range_from(message: Any) -> Range:
 def _battery_to(m: BatteryState) -> Any:
     unmeasured, unknown, lithium_ion = math.nan, 0, 2
     return ros("sensor_msgs/msg/BatteryState")(
-        header=header(m.stamp_s, "base_link"),
+        header=header(m.stamp_s, BASE),
         voltage=m.voltage_v,
         temperature=unmeasured,
         current=unmeasured,

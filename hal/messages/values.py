@@ -143,8 +143,21 @@ class CompressedImage:
 
 
 @dataclass(frozen=True, slots=True)
+class Spread:
+    """Standard deviations of what an odometry says: of x and y each, of yaw, and of the two velocities."""
+
+    position_m: float
+    yaw_rad: float
+    linear_m_s: float
+    angular_rad_s: float
+
+
+@dataclass(frozen=True, slots=True)
 class Odometry:
-    """nav_msgs/Odometry in the plane: pose in `odom`, velocity in `base_link`."""
+    """nav_msgs/Odometry in the plane: pose in `odom`, velocity in `base_link`.
+
+    `spread` is written for others, as covariances; what others write there is not read.
+    """
 
     stamp_s: float
     x_m: float
@@ -152,6 +165,7 @@ class Odometry:
     yaw_rad: float
     linear_m_s: float
     angular_rad_s: float
+    spread: Spread | None = None
 
 
 @dataclass(frozen=True, slots=True)

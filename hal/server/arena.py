@@ -21,6 +21,7 @@ class ArenaLoop:
         self._boundary = bus.boundary
         self._info_service = InfoService(bus, info, arena, now)
         self._state = bus.publisher(SIM_STATE)
+        bus.count_from_1970(now)
 
     def run(self, stop: threading.Event) -> None:
         """Serve until `stop` is set."""

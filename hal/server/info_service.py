@@ -19,13 +19,14 @@ RESETS = 1  # at a time
 class InfoService:
     """Answers `info` and, with an arena, `sim/reset`. To be polled by the thread that owns the robot.
 
-    The answer to a reset is the robot's time of it, as JSON: what was captured earlier is of the last episode.
+    The answer to a reset is its time as the bus has it, as JSON: what was captured earlier is of the last episode.
     """
 
     def __init__(self, bus: Bus, info: Info, arena: Arena | None, now: Callable[[], float]) -> None:
         self._info = info.to_json()
         self._arena = arena
         self._now = now
+        self._bus = bus
         self._info_asked = bus.questions(INFO)
         self._reset_asked = None if arena is None else bus.questions(RESET)
 
@@ -42,7 +43,7 @@ class InfoService:
                 question.refuse(why)
             else:
                 show()
-                question.answer(msgspec.json.encode(reset_s))
+                question.answer(msgspec.json.encode(reset_s + self._bus.offset_s))
 
         self._info_asked.serve(lambda question: question.answer(self._info), prepare=show)
         if self._reset_asked is not None:

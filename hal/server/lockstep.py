@@ -28,14 +28,21 @@ IDLE_POLL_S = 0.002
 class LockstepLoop:
     """Serves one robot whose time passes only in `wait`."""
 
-    def __init__(self, robot: GovernedRobot, bus: Bus, info_service: InfoService, arena: Arena | None) -> None:
+    def __init__(
+        self,
+        robot: GovernedRobot,
+        bus: Bus,
+        sensors: SensorPublisher,
+        info_service: InfoService,
+        arena: Arena | None,
+    ) -> None:
         self._robot = robot
         self._info_service = info_service
         self._arena = arena
         self._boundary = bus.boundary
         self._inlet = Inlet(bus)
         self._estop = EstopService(robot, bus)
-        self._sensors = SensorPublisher(bus, robot.profile, lockstep=True)
+        self._sensors = sensors
         self._applied = bus.publisher(APPLIED, IN_LOCKSTEP)
         self._state = bus.publisher(SIM_STATE, IN_LOCKSTEP)
         self._clock = bus.publisher(CLOCK, IN_LOCKSTEP)

@@ -9,6 +9,7 @@
 import threading
 import time
 from collections import deque
+from collections.abc import Callable
 
 from lira.hal.bus.bus import Bus
 from lira.hal.bus.topics import APPLIED, CMD_VEL, SIM_STATE
@@ -30,13 +31,19 @@ UNTOLD = 16  # what was applied and could not be told yet, at most
 
 
 class CommandLoop:
-    """Moves the wheels: law 1 stands on this page. Nothing here waits for the bus: `events` tells what was applied."""
+    """Moves the wheels: law 1 stands on this page. Nothing here waits for the bus: `events` tells what was applied.
 
-    def __init__(self, robot: GovernedRobot, bus: Bus, events: "AppliedLoop") -> None:
+    `alive` is called with every look of the watchdog: whoever supervises the process hears by it that the loop turns.
+    """
+
+    def __init__(
+        self, robot: GovernedRobot, bus: Bus, events: "AppliedLoop", alive: Callable[[], None] = lambda: None
+    ) -> None:
         self._robot = robot
         self._inlet = Inlet(bus)
         self._boundary = bus.boundary
         self._events = events
+        self._alive = alive
 
     def run(self, stop: threading.Event) -> None:
         """Obey and watch until `stop` is set; leaves the wheels at zero, whatever happens."""
@@ -52,6 +59,7 @@ class CommandLoop:
                     continue
                 now_s = time.monotonic()
                 watch_s = now_s + WATCHDOG_S
+                self._alive()
                 if commanded or applied.reason is not told or now_s >= publish_s:
                     publish_s = now_s + 1.0 / APPLIED.rate_hz
                     told = applied.reason

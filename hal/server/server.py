@@ -13,6 +13,7 @@ from lira.hal.bus.bus import Bus
 from lira.hal.bus.services import LOCKSTEP, REALTIME, Info
 from lira.hal.bus.topics import INFO
 from lira.hal.errors import BusError
+from lira.hal.messages import CameraInfo
 from lira.hal.port import Arena
 from lira.hal.safety.governed import GovernedRobot
 from lira.hal.server.diagnostics import Reporter
@@ -31,7 +32,8 @@ class HalServer:
     """Serves `robot` until told to stop. It opens and closes the robot; the bus stays the caller's.
 
     `arena` is the twin behind the robot, if there is one, and `arena_info` JSON about its world for whoever asks.
-    `ready`, if given, is called once the robot answers.
+    `calibration` is its camera's, None for the profile's pinhole. `ready`, if given, is called once the robot answers;
+    in real time `alive` over and over by the thread that moves the wheels, so it must not wait.
     """
 
     def __init__(
@@ -42,13 +44,17 @@ class HalServer:
         *,
         arena_info: bytes = b"null",
         lockstep: bool = False,
+        calibration: CameraInfo | None = None,
         ready: Callable[[], None] = lambda: None,
+        alive: Callable[[], None] = lambda: None,
     ) -> None:
         self._robot = robot
         self._bus = bus
         self._arena = arena
         self._info = Info(robot.profile, LOCKSTEP if lockstep else REALTIME, bus.epoch, msgspec.Raw(arena_info))
+        self._calibration = calibration
         self._ready = ready
+        self._alive = alive
 
     def run(self, stop: threading.Event) -> None:
         """Serve until `stop` is set; sets it if a thread of the server fails, and raises what it failed with.
@@ -75,7 +81,9 @@ class HalServer:
     def _run_lockstep(self, stop: threading.Event) -> None:
         self._robot.open()
         try:
-            loop = LockstepLoop(self._robot, self._bus, self._info_service(), self._arena)
+            sensors = SensorPublisher(self._bus, self._robot.profile, self._calibration, lockstep=True)
+            loop = LockstepLoop(self._robot, self._bus, sensors, self._info_service(), self._arena)
+            sensors.describe(self._robot.now())
             self._ready()
             loop.run(stop)
         finally:
@@ -85,13 +93,15 @@ class HalServer:
         sys.setswitchinterval(SWITCH_S)
         crew = _Crew(stop)
         opened, wheels_still = threading.Event(), threading.Event()
-        publisher = SensorPublisher(self._bus, self._robot.profile, lockstep=False)
+        publisher = SensorPublisher(self._bus, self._robot.profile, self._calibration, lockstep=False)
         pictures = PictureLoop(self._robot, publisher)
 
         def sense() -> None:
             # What opens the devices reads and closes them: some are bound to their thread.
             self._robot.open()
             try:
+                self._bus.count_from_1970(self._robot.now)
+                publisher.describe(self._robot.now())
                 loop = SensorLoop(self._robot, self._bus, publisher, pictures, self._info_service(), self._arena)
                 opened.set()
                 loop.run(wheels_still)
@@ -102,7 +112,7 @@ class HalServer:
         while not opened.wait(LOOK_S) and not stop.is_set():
             pass
         applied = AppliedLoop(self._robot, self._bus)
-        commands = CommandLoop(self._robot, self._bus, applied)
+        commands = CommandLoop(self._robot, self._bus, applied, self._alive)
         wheels = crew.start("commands", lambda: commands.run(stop))
         crew.start("applied", lambda: applied.run(stop))
         crew.start("pictures", lambda: pictures.run(stop))

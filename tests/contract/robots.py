@@ -50,6 +50,7 @@ class Rig:
     real_time: bool = False  # its time passes by itself
     stepped: bool = False  # its time passes with policy's commands only, a period each
     stamps_s: float = 1e-6  # how far a stamp may be off: far from zero a float does not hold all nanoseconds
+    ahead_s: float = 0.0  # of the source's clock: on the bus it counts from 1970
 
 
 @contextmanager
@@ -64,7 +65,8 @@ def served(inner: NullRobot | Twin, *, lockstep: bool) -> Iterator[Rig]:
     robot = RemoteRobot(client_bus)
     try:
         robot.open()
-        yield Rig(robot, inner, RemoteArena(robot), real_time=not lockstep, stepped=lockstep)
+        stamps_s = 1e-6 if lockstep else 1e-5
+        yield Rig(robot, inner, RemoteArena(robot), not lockstep, lockstep, stamps_s, robot_bus.offset_s)
     finally:
         robot.close()
         stop.set()

@@ -68,7 +68,7 @@ def test_every_sensor_of_the_robot_arrives_as_it_was_measured(rig):
     for sensor in sensors_of(rig.robot.profile):
         got = sensor.value(seen)
         assert got is not None, f"{sensor.name} never arrives"
-        sent = [each for each in measured[sensor.name] if abs(each.stamp_s - got.stamp_s) < rig.stamps_s]
+        sent = [each for each in measured[sensor.name] if abs(each.stamp_s + rig.ahead_s - got.stamp_s) < rig.stamps_s]
         assert any(alike(each, got) for each in sent), f"{sensor.name}: {got}"
     has = {sensor.name for sensor in SENSORS if sensor.value(seen) is not None}
     assert has == {sensor.name for sensor in sensors_of(rig.robot.profile)}

@@ -92,12 +92,14 @@ class Choosing(Learner):
 
 
 class Run:
-    def __init__(self, line, method=None, robot=None, **words):
+    def __init__(self, line, method=None, robot=None, *, begins=False, **words):
         self.line, self.method, self.robot = line, method or Learner(), robot or Drives()
         self.said, self.written = [], []
         journal, loop = Journal(write=self.written.append), ControlLoop(self.robot)
         self.service = OperatorService(line, loop, self.method, journal, self.said.append, **words)
         with contextlib.closing(self.service):
+            if begins:
+                self.service.begin()
             serve(loop, self.method, journal, line.stop, lambda _: None, operator_service=self.service)
 
     @property
@@ -119,6 +121,16 @@ def test_paused_it_stands_learns_nothing_and_goes_on_after_a_neutral_command():
     assert [answer["count"] for answer in line.answers] == [0, 1, 2, 3]
     assert run.said[0].startswith("operator: paused: the robot stands")
     assert run.said[-1] == "operator: it drives and learns again"
+
+
+def test_who_begins_paused_says_nothing_to_the_robot_until_a_person_asks_to_go_on():
+    run = Run(Script([], [], ask(Request.RESUME), []), begins=True, paused=True)
+    assert run.robot.twists == [STOP, GO_TWIST, GO_TWIST]
+    assert run.line.answers[0]["paused"]
+
+
+def test_who_begins_as_usual_arms_and_drives():
+    assert Run(Script([], []), begins=True).robot.twists == [STOP, GO_TWIST, GO_TWIST]
 
 
 def test_to_go_on_when_nothing_was_paused_changes_nothing():

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from lira.fusion.control import to_twist
-from lira.fusion.methods.base import Choice, Proposal
+from lira.fusion.methods.base import AsTaught, Choice, Proposal
 from lira.fusion.preprocess import Features
 from lira.fusion.teaching.teacher import PERFECT, SKILLED, ScriptedTeacher, TeacherSettings
 from lira.hal.messages import Call, Command, CourseState, Episode
@@ -44,7 +44,7 @@ class Crystal:
     def set_layout(self, layout):
         self.layouts.append(layout)
 
-    def rollout(self, state, policy, steps, period_s, ends):
+    def rollout(self, state, policy, steps, period_s, ends, first=None):
         self.rollouts += 1
         return [replace(state, x_m=state.x_m + 0.2, collided=self.danger)]
 
@@ -56,6 +56,18 @@ class Crystal:
 def at(step):
     """Return the truth in the middle of nowhere, so many steps after the start."""
     return CourseState(step * PERIOD_S, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, clearance_m=1.0)
+
+
+class Straight(Crystal):
+    """A foresight in which every policy drives straight on from the origin's line; it notes what is asked of it."""
+
+    def __init__(self):
+        super().__init__()
+        self.asked = []
+
+    def rollout(self, state, policy, steps, period_s, ends, first=None):
+        self.asked.append((state.x_m, steps, first is not None))
+        return [replace(state, x_m=state.x_m + period_s * k) for k in range(1, steps + 1)]
 
 
 @pytest.fixture
@@ -76,6 +88,43 @@ def drive(hand, crystal, dangers, proposal=QUIET):
         crystal.danger = mark == "x"
         held.append(hand.act(at(step), proposal, straight) is not None)
     return "".join("H" if each else "-" for each in held)
+
+
+def test_what_was_foreseen_and_came_true_is_not_looked_at_again():
+    future, horizon = Straight(), 8
+    hand = teacher(future)
+    for step in range(3):
+        hand.act(replace(at(0), x_m=PERIOD_S * step + 1e-9), QUIET, straight)
+    whole, *rest = future.asked
+    assert whole == (1e-9, horizon, True)
+    assert [(steps, first) for _, steps, first in rest] == [(1, False)] * 2  # what was beyond the horizon before
+
+
+@pytest.mark.parametrize("change", [{"x_m": 0.201}, {"yaw_rad": 0.001}, {"linear_m_s": 0.9}, {"progress_m": 0.1}])
+def test_a_robot_that_is_not_where_it_was_foreseen_is_looked_at_anew(change):
+    future = Straight()
+    hand = teacher(future)
+    hand.act(at(0), QUIET, straight)
+    hand.act(replace(at(0), **{"x_m": 0.2} | change), QUIET, straight)
+    assert [steps for _, steps, _ in future.asked] == [8, 8]
+
+
+def test_another_policy_and_one_that_has_learned_are_looked_at_anew():
+    future = Straight()
+    hand = teacher(future)
+    novice = [AsTaught(straight, 1), AsTaught(straight, 1), AsTaught(straight, 2), lambda _: (1.0, 0.0)]
+    for step, policy in enumerate(novice):
+        hand.act(replace(at(0), x_m=0.2 * step), QUIET, policy)
+    assert [steps for _, steps, _ in future.asked] == [8, 1, 8, 8]
+
+
+def test_a_new_episode_begins_with_a_look():
+    future = Straight()
+    hand = teacher(future)
+    hand.act(at(0), QUIET, straight)
+    hand.reset(5)
+    hand.act(replace(at(0), x_m=0.2), QUIET, straight)
+    assert [steps for _, steps, _ in future.asked] == [8, 8]
 
 
 def test_a_perfect_teacher_takes_over_at_once_and_lets_go_after_three_safe_steps(crystal):

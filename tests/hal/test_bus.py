@@ -31,7 +31,7 @@ def odom(x_m):
 def test_the_table_has_no_key_twice_and_every_rate_fits_its_age():
     assert len({topic.key for topic in TOPICS}) == len(TOPICS)
     for topic in TOPICS:
-        assert 1.0 / topic.rate_hz < topic.max_age_s, topic.key
+        assert topic.rate_hz == 0.0 or 1.0 / topic.rate_hz < topic.max_age_s, topic.key
 
 
 def test_two_links_are_up(pair):

@@ -56,6 +56,25 @@ def test_a_look_ahead_that_ends_is_the_beginning_of_a_whole_one(turn):
     foresight.close()
 
 
+def test_a_look_ahead_goes_on_from_where_one_has_ended():
+    profile = load_profile("thesis-sim")
+    twin, foresight = Twin(profile, "line-obstacles", layout=3), Foresight(profile, "line-obstacles", 3)
+
+    def towards_the_light(seen):
+        return 1.0, float(np.clip(seen.image.data[:, :16].mean() / seen.image.data[:, 16:].mean() - 1.0, -1.0, 1.0))
+
+    twin.reset(Episode(3, start_m=4.0, yaw_rad=0.1))
+    whole = foresight.rollout(twin.state(), towards_the_light, 8, 0.2)
+    twin.open()
+    first = towards_the_light(twin.read())  # what is done with what is seen already
+    begun = foresight.rollout(twin.state(), towards_the_light, 3, 0.2, first=first)
+    for one, other in zip([*begun, *foresight.rollout(begun[-1], towards_the_light, 5, 0.2)], whole, strict=True):
+        assert (one.x_m, one.y_m, one.yaw_rad) == pytest.approx((other.x_m, other.y_m, other.yaw_rad), abs=1e-9)
+        assert (one.progress_m, one.clearance_m) == pytest.approx((other.progress_m, other.clearance_m), abs=1e-9)
+    foresight.close()
+    twin.close()
+
+
 def test_nothing_of_pybullet_is_loaded_for_a_sketch():
     code = (
         "import sys; from lira.hal.profile import load_profile; from lira.sim_backend.twin import Twin\n"

@@ -3,15 +3,15 @@
 import glob
 import grp
 import os
-import socket
 from pathlib import Path
 
 from lira.hal.bus.keys import VARIABLE, keys_from_environment
 from lira.tools.doctor.finding import Finding, Patient, fail, ok, warn
 from lira.tools.joystick.nodes import is_any_pad, motion_of, read_nodes
 from lira.tools.joystick.rules import PLACE, REMEDY
+from lira.tools.lifecycle.ports import taken
+from lira.tools.lifecycle.setup import PORT
 
-PORT = 7447
 SERIAL = ("/dev/serial/by-id/*", "/dev/rplidar", "/dev/core2", "/dev/ttyUSB*", "/dev/ttyACM*")
 CAMERAS = ("/dev/video*",)
 ORBBEC = "2bc5"
@@ -62,23 +62,11 @@ def keys(_: Patient) -> Finding:
 
 def ports(_: Patient) -> Finding:
     """Whether a robot can be served on this machine."""
-    taken = [kind for kind in ("TCP", "UDP") if not _is_free(kind)]
-    if taken:
+    kinds = taken(PORT)
+    if kinds:
         remedy = "That is right where a robot or a twin runs; else: ss -lptun | grep 7447, or --listen another port."
-        return ok(f"port {PORT} is in use ({', '.join(taken)}). {remedy}", taken=taken)
-    return ok(f"port {PORT} is free", taken=taken)
-
-
-def _is_free(kind: str) -> bool:
-    family = socket.SOCK_STREAM if kind == "TCP" else socket.SOCK_DGRAM
-    with socket.socket(socket.AF_INET, family) as probe:
-        if kind == "TCP":
-            probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
-        try:
-            probe.bind(("127.0.0.1", PORT))
-        except OSError:
-            return False
-    return True
+        return ok(f"port {PORT} is in use ({', '.join(kinds)}). {remedy}", taken=kinds)
+    return ok(f"port {PORT} is free", taken=kinds)
 
 
 def _openable(path: str, group: str, what: str = "") -> Finding:

@@ -107,10 +107,14 @@ class Bridge:
         """How the dead-man is."""
         return self._hand.state
 
-    def run(self, stop: threading.Event) -> None:
-        """Go on until `stop` is set; then let the robot stand if a hand was on the controls."""
+    def run(self, stop: threading.Event, alive: Callable[[], None] = lambda: None) -> None:
+        """Go on until `stop` is set; then let the robot stand if a hand was on the controls.
+
+        `alive` is called with every turn.
+        """
         try:
             while not stop.is_set():
+                alive()
                 self._step()
         finally:
             if self._sent.action is not None:

@@ -25,6 +25,22 @@ class Part:
     command: Callable[[str], list[str]]
 
 
+def twin_words(world: str, profile: str | None, seed: int, renderer: str | None = None) -> list[str]:
+    """Which twin it is, in words for `lira twin`: the robot of the world's experiment, and the quickest renderer.
+
+    Raises `ConfigError` for a world or a profile that is none.
+    """
+    from lira.fusion.experts.tasks import TASKS, task_of
+    from lira.hal.profile import load_profile
+    from lira.sim_backend.catalogue import load_world
+    from lira.sim_backend.scenes.opening import quickest
+
+    place = load_world(world)
+    robot = profile or TASKS[task_of(place.name)].profile
+    load_profile(robot)
+    return ["--world", world, "--profile", robot, "--renderer", renderer or quickest(place), "--seed", str(seed)]
+
+
 def direct(name: str, endpoint: str, twin: Sequence[str], *, lockstep: bool) -> list[Part]:
     """The twin as a robot on the bus. `twin` are the words that say which: world, profile, layout, seed."""
     words = ["twin", *twin, "--name", name, "--listen", endpoint, *(["--lockstep"] if lockstep else [])]

@@ -8,9 +8,9 @@ import subprocess
 import sys
 import threading
 import time
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
-from types import TracebackType
+from types import MappingProxyType, TracebackType
 from typing import Self
 
 from lira.hal.errors import LiraError, StorageError
@@ -33,9 +33,9 @@ class ProcessError(LiraError):
     """A child process that did not start, was not ready in time, or ended by itself."""
 
 
-def lira_command(*words: str) -> list[str]:
-    """Return the command line of a `lira` verb in the running interpreter, whatever PATH says."""
-    return [sys.executable, "-m", "lira.tools", *words]
+def lira_command(*words: str, python: str = sys.executable) -> list[str]:
+    """Return the command line of a `lira` verb in the running interpreter or another, whatever PATH says."""
+    return [python, "-m", "lira.tools", *words]
 
 
 def free_port() -> int:
@@ -56,15 +56,24 @@ def free_port() -> int:
 class ChildProcess:
     """A process with its output in a log file. Leaving its `with` block stops it, and so does the parent's death.
 
-    It runs in a session of its own: Ctrl-C reaches the parent alone, which decides who stops first.
+    It runs in a session of its own: Ctrl-C reaches the parent alone, which decides who stops first. A log that is
+    `kept` is added to; `environ` is set beside what this process has.
     """
 
-    def __init__(self, name: str, command: Sequence[str], log: Path) -> None:
+    def __init__(
+        self,
+        name: str,
+        command: Sequence[str],
+        log: Path,
+        *,
+        kept: bool = False,
+        environ: Mapping[str, str] = MappingProxyType({}),
+    ) -> None:
         self.name = name
         self.log = log
         try:
             log.parent.mkdir(parents=True, exist_ok=True)
-            output = log.open("wb")
+            output = log.open("ab" if kept else "wb")
         except OSError as error:
             raise StorageError(f"cannot write {log}: {error.strerror}", "Choose another folder.") from error
         with output:
@@ -73,7 +82,7 @@ class ChildProcess:
                 stdin=subprocess.DEVNULL,
                 stdout=output,
                 stderr=subprocess.STDOUT,
-                env=os.environ | {"PYTHONUNBUFFERED": "1"},
+                env={**os.environ, "PYTHONUNBUFFERED": "1", **environ},
                 start_new_session=True,
             )
 
@@ -125,9 +134,9 @@ class ChildProcess:
 
     def failure(self) -> ProcessError:
         """Describe a process that ended though it should not have."""
-        status = self.status()
-        how = f"signal {signal.Signals(-status).name}" if status is not None and status < 0 else f"status {status}"
-        return ProcessError(f"{self.name} ended with {how}; it wrote:\n{self.tail()}", f"All of it: {self.log}")
+        return ProcessError(
+            f"{self.name} ended with {how_ended(self.status())}; it wrote:\n{self.tail()}", f"All of it: {self.log}"
+        )
 
     def signal(self, number: signal.Signals) -> None:
         """Send it a signal; nothing happens if it has ended."""
@@ -150,6 +159,11 @@ class ChildProcess:
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         self.stop()
+
+
+def how_ended(status: int | None) -> str:
+    """Say what an exit status means."""
+    return f"signal {signal.Signals(-status).name}" if status is not None and status < 0 else f"status {status}"
 
 
 def _with_parent(command: Sequence[str]) -> list[str]:

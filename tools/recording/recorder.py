@@ -75,12 +75,13 @@ class Recorder:
         with self._lock:
             return self._backlog.lost.copy()
 
-    def run(self, stop: threading.Event, heard: list[RawSample]) -> None:
-        """Record until `stop` is set. Raises `StorageError` if the disk took no more."""
+    def run(self, stop: threading.Event, heard: list[RawSample], alive: Callable[[], None] = lambda: None) -> None:
+        """Record until `stop` is set; `alive` is called with every turn. Raises `StorageError` if the disk is full."""
         clerk = threading.Thread(target=self._write, name="recorder", daemon=True)
         self._push(heard)
         clerk.start()
         while not stop.wait(POLL_S) and clerk.is_alive():
+            alive()
             self._push(self._tap.poll())
         until_s = time.monotonic() + LAST_S
         while time.monotonic() < until_s and clerk.is_alive():

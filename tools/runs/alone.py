@@ -10,10 +10,11 @@ from lira.fusion.operator_service import OperatorService
 from lira.fusion.service import serve
 from lira.hal.client.remote import RemoteRobot
 from lira.tools.launch.lifetime import stop_or_interrupt
+from lira.tools.launch.notify import Notifier
 from lira.tools.operator.voice import explain
 from lira.tools.runs.course import Course, show_alone
 from lira.tools.runs.progress import Publish, Say, telling
-from lira.tools.runs.reach import arena_of, request_line, restarter, world_of
+from lira.tools.runs.reach import PAUSED, arena_of, request_line, restarter, world_of
 
 
 def show(args: argparse.Namespace, robot: RemoteRobot, publish: Publish, say: Say) -> int:
@@ -21,12 +22,14 @@ def show(args: argparse.Namespace, robot: RemoteRobot, publish: Publish, say: Sa
     method = load_alone(
         args.policy, robot.profile, args.experts or task_of(world_of(robot)), ask=args.ask, shield=args.shield
     )
-    journal, loop = Journal(publish=publish), ControlLoop(robot)
+    journal, loop, notifier = Journal(publish=publish), ControlLoop(robot), Notifier.from_environment()
     with stop_or_interrupt() as stop, request_line(robot, args) as line:
-        service = OperatorService(line, loop, method, journal, say, restart=restarter(robot, args))
-        loop.arm()
-        say(f"'{args.policy}' drives '{args.name}'; stop with Ctrl-C")
-        serve(loop, method, journal, stop, say, operator_service=service, explain=explain)
+        service = OperatorService(line, loop, method, journal, say, restart=restarter(robot, args), paused=args.paused)
+        service.begin()
+        words = f"'{args.policy}' drives '{args.name}'; {PAUSED if args.paused else 'stop with Ctrl-C'}"
+        say(words)
+        notifier.ready(words)
+        serve(loop, method, journal, stop, say, operator_service=service, explain=explain, alive=notifier.alive)
     return 0
 
 

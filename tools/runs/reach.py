@@ -19,6 +19,7 @@ from lira.tools.launch.lifetime import CLOSE_S
 from lira.tools.live.hand import Hand
 
 FLOOR = "floor"  # the world of a robot that is in none of ours
+PAUSED = "paused: P on a screen, or square on the pad, begins"
 NO_TWIN = "Here, a person teaches (--teacher none), and a policy drives without --unseen."
 
 

@@ -13,11 +13,12 @@ from lira.fusion.operator_service import OperatorService
 from lira.fusion.service import serve
 from lira.hal.client.remote import RemoteRobot
 from lira.tools.launch.lifetime import saving, stop_or_interrupt
+from lira.tools.launch.notify import Notifier
 from lira.tools.operator.voice import explain
 from lira.tools.runs.build import NewTrainer, build_method
 from lira.tools.runs.folder import LABELS, RECORD, snapshot
 from lira.tools.runs.progress import Publish, Say
-from lira.tools.runs.reach import hand_of, request_line, restarter, world_of
+from lira.tools.runs.reach import PAUSED, hand_of, request_line, restarter, world_of
 from lira.tools.runs.teach import Plan
 
 
@@ -27,6 +28,7 @@ def learn_from_person(
     """Learn from whoever takes control with the dead-man, until Ctrl-C; then, or when it fails, save the novice."""
     profile, world = robot.profile, world_of(robot)
     head, folder = plan.head(profile, world), plan.folder
+    notifier = Notifier.from_environment()
     assert folder is not None
     # The log goes first: if it is damaged, nothing else is touched.
     with (
@@ -50,9 +52,13 @@ def learn_from_person(
                     say,
                     restart=restarter(robot, args),
                     snapshot=lambda: snapshot(folder, novice, profile, head, log.sync),
+                    paused=args.paused,
                 )
-                loop.arm()
-                say(f"{args.method} learns on '{args.name}' with {novice.stored} labels; hold the dead-man to drive")
+                service.begin()
+                how = PAUSED if args.paused else "hold the dead-man to drive"
+                words = f"{args.method} learns on '{args.name}' with {novice.stored} labels; {how}"
+                say(words)
+                notifier.ready(words)
                 with contextlib.closing(service):
                     serve(
                         loop,
@@ -65,5 +71,6 @@ def learn_from_person(
                         explain=explain,
                         layout=args.layout,
                         is_attended=lambda: hand.holds,
+                        alive=notifier.alive,
                     )
     return 0

@@ -49,6 +49,10 @@ GROUPS = {
         "report": "make the HTML page of a recorded run",
     },
     ("operation", "Operation"): {
+        "up": "start all that a robot needs, and keep it running: twin, learner, page, pad",
+        "status": "what is up: processes, rates, ages, link, who drives",
+        "logs": "what the processes that are up have written",
+        "down": "stop all that is up, drivers first and the robot last",
         "keys": "make the keys that say who may drive a robot, and encrypt the bus",
     },
     ("checks", "Checks"): {

@@ -276,9 +276,18 @@ class PageServer:
 
 
 async def serve_page(
-    server: PageServer, host: str, port: int, tls: ssl.SSLContext | None, ready: Callable[[int], None], stop: Event
+    server: PageServer,
+    host: str,
+    port: int,
+    tls: ssl.SSLContext | None,
+    ready: Callable[[int], None],
+    stop: Event,
+    alive: Callable[[], None] = lambda: None,
 ) -> None:
-    """Serve until `stop` is set; `ready` gets the port. Raises `ConfigError` if the address cannot be had."""
+    """Serve until `stop` is set; `ready` gets the port, `alive` is called again and again.
+
+    Raises `ConfigError` if the address cannot be had.
+    """
     runner = web.AppRunner(server.application(), access_log=None, shutdown_timeout=1.0)
     await runner.setup()
     try:
@@ -291,6 +300,7 @@ async def serve_page(
             ) from error
         ready(runner.addresses[0][1])
         while not stop.is_set():
+            alive()
             await asyncio.sleep(LOOK_S)
     finally:
         await runner.cleanup()

@@ -17,7 +17,7 @@ exit status: 1 if a layout was not passed
 import argparse
 
 from lira.tools.launch.lifetime import CLOSE_S
-from lira.tools.options import add_arena, add_client, add_layout, add_pair, add_shield, natural
+from lira.tools.options import add_arena, add_client, add_layout, add_pair, add_paused, add_shield, natural
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -30,6 +30,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     add_client(parser)
     add_arena(parser)
+    add_paused(parser)
     add_pair(parser)
     add(
         "--ask",

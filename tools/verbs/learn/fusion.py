@@ -27,6 +27,7 @@ from lira.tools.options import (
     add_expert,
     add_layout,
     add_pair,
+    add_paused,
     add_protocol,
     add_seed,
     add_shield,
@@ -74,6 +75,7 @@ def add_teaching(parser: argparse.ArgumentParser) -> None:
         default="none",
         help="who helps: a person with a gamepad (none), or on a twin a script with few, no or many human faults",
     )
+    add_paused(parser)
     add_arena(parser)
     add("--train-laps", type=natural, default=12, help=f"scripted teacher: give up after so many laps {DEFAULT}")
     add_protocol(parser)

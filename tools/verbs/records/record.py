@@ -59,19 +59,23 @@ def record(args: argparse.Namespace, stop: "Event") -> int:
     from lira.hal.bus.bus import Bus
     from lira.tools.cli import version
     from lira.tools.launch.lifetime import CLOSE_S
+    from lira.tools.launch.notify import Notifier
     from lira.tools.recording.recorder import Recorder, listen
     from lira.tools.recording.writer import RecordingWriter
     from lira.tools.runs.reach import say
 
     folder = args.out or Path("recordings") / f"{datetime.now():%Y%m%d-%H%M%S}"
+    notifier = Notifier.from_environment()
     bus = Bus(args.name, connect=args.connect, watch=True)
     try:
         head, tap, heard = listen(bus, version(), shlex.join(["lira", *sys.argv[1:]]), stop)
         writer = RecordingWriter(folder, head, split_bytes=args.split * 2**20)
         os.nice(NICENESS)
         recorder = Recorder(tap, writer, head, say, most_bytes=args.memory * 2**20)
-        say(f"{READY}{args.name}' at {args.connect} into {folder}")
-        recorder.run(stop, heard)
+        words = f"{READY}{args.name}' at {args.connect} into {folder}"
+        say(words)
+        notifier.ready(words)
+        recorder.run(stop, heard, notifier.alive)
     finally:
         bus.close(CLOSE_S)
     lost = recorder.lost.total()

@@ -60,17 +60,21 @@ def run(args: argparse.Namespace) -> int:
     """Serve until told to stop."""
     from lira.hal.profile import load_profile
     from lira.hal.server.serve import serve
+    from lira.tools.launch.notify import Notifier
 
     check_devices(args)
+    notifier = Notifier.from_environment()
     robot = open_own(args) if args.driver is not None else open_rosbot(args, load_profile(args.profile))
 
     def ready(_: "Bus", stop: threading.Event) -> None:
         blind = "".join(f", without {device}" for device in args.without)
         where = f"({robot.profile.name}) on {args.listen}{blind}"
-        print(f"robot '{args.name}' serves {where}; stop with Ctrl-C", flush=True)
+        words = f"robot '{args.name}' serves {where}"
+        print(f"{words}; stop with Ctrl-C", flush=True)
+        notifier.ready(words)
         watch(robot, stop)
 
-    serve(robot, args.name, args.listen, insecure=args.insecure, ready=ready)
+    serve(robot, args.name, args.listen, insecure=args.insecure, ready=ready, alive=notifier.alive)
     return 0
 
 

@@ -87,8 +87,10 @@ def run(args: argparse.Namespace) -> int:
     from lira.hal.server.serve import serve
     from lira.robot.ros2.robot import Interface, Ros2Robot
     from lira.robot.ros2.transport import BRIDGE, RMW
+    from lira.tools.launch.notify import Notifier
     from lira.tools.output.troubles import watch
 
+    notifier = Notifier.from_environment()
     names = topics(args.topic)
     Interface(names)
     profile = load_profile(args.profile)
@@ -98,12 +100,14 @@ def run(args: argparse.Namespace) -> int:
         robot = Ros2Robot(profile, far, interface, RMW if args.rmw else BRIDGE)
 
         def ready(_: Bus, stop: threading.Event) -> None:
-            print(f"robot '{args.name}' (ROS 2 at {args.connect}) serves on {args.listen}", flush=True)
+            words = f"robot '{args.name}' (ROS 2 at {args.connect}) serves on {args.listen}"
+            print(words, flush=True)
+            notifier.ready(words)
             for warning in warnings(far, stamped=interface.stamped):
                 print(f"warning: {warning}", file=sys.stderr, flush=True)
             watch(robot, stop)
 
-        serve(robot, args.name, args.listen, insecure=args.insecure, ready=ready)
+        serve(robot, args.name, args.listen, insecure=args.insecure, ready=ready, alive=notifier.alive)
     return 0
 
 

@@ -91,7 +91,9 @@ def run(args: argparse.Namespace) -> int:
 
     from lira.hal.server.serve import serve
     from lira.sim_backend.twin import Twin
+    from lira.tools.launch.notify import Notifier
 
+    notifier = Notifier.from_environment()
     factor = None if args.lockstep else args.speed
     twin = Twin(profile, world, layout=args.layout, seed=args.seed, realtime_factor=factor, renderer=args.renderer)
     pace = "lockstep" if args.lockstep else "real time" if factor == 1.0 else f"{factor:g} times real time"
@@ -99,7 +101,9 @@ def run(args: argparse.Namespace) -> int:
     def ready(bus: "Bus", stop: threading.Event) -> None:
         where = f"world '{world.name}' ({profile.name}, {DRAWN[twin.renderer]}) on {args.listen}"
         where += ", encrypted" if bus.encrypted else ", open to anybody there" if args.insecure else ""
-        print(f"twin '{args.name}' serves {where}, {pace}; stop with Ctrl-C", flush=True)
+        words = f"twin '{args.name}' serves {where}, {pace}"
+        print(f"{words}; stop with Ctrl-C", flush=True)
+        notifier.ready(words)
         if not args.lockstep:  # there the driver tells how it goes
             threading.Thread(target=report, args=(twin, bus, stop), daemon=True, name="status").start()
 
@@ -112,6 +116,7 @@ def run(args: argparse.Namespace) -> int:
         lockstep=args.lockstep,
         insecure=args.insecure,
         ready=ready,
+        alive=notifier.alive,
     )
     return 0
 

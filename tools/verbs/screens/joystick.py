@@ -57,7 +57,9 @@ def run(args: argparse.Namespace) -> int:
     from lira.tools.joystick.bridge import Bridge
     from lira.tools.joystick.client import TeleopClient
     from lira.tools.joystick.known_pads import PadMemory, state_file
+    from lira.tools.launch.notify import Notifier
 
+    notifier = Notifier.from_environment()
     bus, watch = Bus(args.name, connect=args.connect), None
     try:
         with stop_or_interrupt() as stop:
@@ -66,8 +68,10 @@ def run(args: argparse.Namespace) -> int:
             client = TeleopClient(bus, watch, ANSWER_S, say)
             finder = Finder(mapping, args.device)
             bridge = Bridge(client, finder, PadMemory(state_file(), say), say, finder.advice)
-            say(f"joystick drives '{args.name}' at {args.connect}; stop with Ctrl-C")
-            bridge.run(stop)
+            words = f"joystick drives '{args.name}' at {args.connect}"
+            say(f"{words}; stop with Ctrl-C")
+            notifier.ready(words)
+            bridge.run(stop, notifier.alive)
     finally:
         for session in (bus, watch):
             if session is not None:

@@ -26,6 +26,7 @@ from typing import TYPE_CHECKING
 from lira.tools.options import DEFAULT, add_client, add_layout, port
 
 if TYPE_CHECKING:
+    from lira.tools.launch.notify import Notifier
     from lira.tools.web.access import Access
 
 
@@ -49,6 +50,7 @@ def run(args: argparse.Namespace) -> int:
         return 0
 
     from lira.hal.bus.keys import keys_from_environment
+    from lira.tools.launch.notify import Notifier
     from lira.tools.operator.beside import beside
     from lira.tools.operator.listen import Ears
     from lira.tools.web.access import Access, own_names, tls_context
@@ -57,6 +59,7 @@ def run(args: argparse.Namespace) -> int:
     from lira.tools.web.server import PageServer, serve_page
     from lira.tools.web.settings import settings_of
 
+    notifier = Notifier.from_environment()
     tls = tls_context(keys_from_environment(), args.listen)
     access = Access(open_here=tls is None, hosts=own_names(args.listen))
     with contextlib.ExitStack() as stack:
@@ -65,17 +68,20 @@ def run(args: argparse.Namespace) -> int:
         controls = None if client is None else stack.enter_context(contextlib.closing(Controls(client, seat)))
         settings = partial(settings_of, robot.info, args.name, args.layout)
         server = PageServer(ears.look, seat, access, controls, settings)
-        tell = partial(_tell, args, access)
-        asyncio.run(serve_page(server, args.listen, args.port, tls, tell, robot.stop))
+        tell = partial(_tell, args, access, notifier)
+        asyncio.run(serve_page(server, args.listen, args.port, tls, tell, robot.stop, notifier.alive))
     return 0
 
 
-def _tell(args: argparse.Namespace, access: "Access", port: int) -> None:
+def _tell(args: argparse.Namespace, access: "Access", notifier: "Notifier", port: int) -> None:
     """Say where the page is; from other machines by links, and by new ones for each line on the terminal."""
+    where = f"at http://{args.listen}:{port}" if access.open_here else f"on port {port}, by a link for one browser each"
+    words = f"web shows '{args.name}' {where}"
+    notifier.ready(words)
     if access.open_here:
-        print(f"web shows '{args.name}' at http://{args.listen}:{port}", flush=True)
+        print(words, flush=True)
         return
-    print(f"web shows '{args.name}' on port {port}, by a link for one browser each; Enter makes new ones", flush=True)
+    print(f"{words}; Enter makes new ones", flush=True)
     _tell_links(access, port)
     if sys.stdin is not None and sys.stdin.isatty():
         threading.Thread(target=_offer_links, args=(access, port), name="links", daemon=True).start()

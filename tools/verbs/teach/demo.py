@@ -74,8 +74,7 @@ def run(args: argparse.Namespace) -> int:
     from lira.fusion.methods.syllabus import THESIS, with_proof
     from lira.hal.profile import load_profile
     from lira.sim_backend.catalogue import load_world
-    from lira.sim_backend.scenes.opening import quickest
-    from lira.tools.launch.launch import direct, wired
+    from lira.tools.launch.launch import direct, twin_words, wired
     from lira.tools.launch.processes import free_port, lira_command
 
     # What cannot work is refused before anything starts.
@@ -100,7 +99,7 @@ def run(args: argparse.Namespace) -> int:
     port = free_port()
     name, endpoint = f"demo_{port}", f"127.0.0.1:{port}"
     both = ["--layout", str(args.layout), "--seed", str(args.seed)]
-    twin = ["--world", world, "--profile", robot, "--renderer", args.renderer or quickest(place), *both]
+    twin = [*twin_words(world, robot, args.seed, args.renderer), "--layout", str(args.layout)]
     fusion = [*both, "--name", name, "--connect", endpoint, "--method", args.method, "--teacher", "scripted"]
     fusion += ["--run", str(folder), "--train-laps", str(args.laps), "--unseen", str(args.unseen)]
     fusion += ["--layouts", args.layouts, "--proof", args.proof]

@@ -147,23 +147,18 @@ def plan_of(args: argparse.Namespace) -> "Plan":
 @contextlib.contextmanager
 def robot_of(args: argparse.Namespace) -> Iterator[None]:
     """The robot that is there, or a twin for as long as the session lasts. Sets `args.connect`, for a script a name."""
-    from lira.fusion.experts.tasks import TASKS, task_of
-    from lira.sim_backend.catalogue import load_world
-    from lira.sim_backend.scenes.opening import quickest
-    from lira.tools.launch.launch import direct, running
+    from lira.tools.launch.launch import direct, running, twin_words
     from lira.tools.launch.processes import free_port
     from lira.tools.runs.reach import say
 
     if args.connect is not None:
         yield
         return
-    place = load_world(args.world)
     if args.person != "hand":
         args.listen = f"127.0.0.1:{free_port()}"
         args.name = f"taught_{args.listen.rpartition(':')[2]}"
-    profile = args.profile or TASKS[task_of(place.name)].profile
-    twin = ["--world", args.world, "--profile", profile, "--renderer", quickest(place)]
-    twin += ["--layout", str(args.layout), "--seed", str(args.seed), "--speed", str(args.speed)]
+    twin = twin_words(args.world, args.profile, args.seed)
+    twin += ["--layout", str(args.layout), "--speed", str(args.speed)]
     args.connect = args.listen
     with running(direct(args.name, args.listen, twin, lockstep=False), args.run, say):
         yield

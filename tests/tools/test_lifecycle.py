@@ -1,0 +1,362 @@
+"""The list of processes, when one is started again, what is written down, and what `lira status` makes of it."""
+
+import argparse
+import json
+import os
+import subprocess
+import sys
+import time
+
+import msgspec
+import pytest
+
+from lira.hal.errors import ConfigError
+from lira.tools.cli import EXTRAS, Parser, main
+from lira.tools.lifecycle import folder as folders
+from lira.tools.lifecycle.folder import AlreadyUpError, StateFolder
+from lira.tools.lifecycle.line import WINDOW_S, Rate
+from lira.tools.lifecycle.logs import Follower, last_lines
+from lira.tools.lifecycle.records import HEARD, STATE, Heard, ProcessState, State, TopicState
+from lira.tools.lifecycle.restart import CALM_S, LONGEST_S, READY_S, Phase, Restarts, pause_s
+from lira.tools.lifecycle.setup import Setup, endpoint_of, run_folder
+from lira.tools.lifecycle.status import as_object, as_text, look
+from lira.tools.lifecycle.table import PROCESSES, SETS, Host, chosen, rows
+from lira.tools.verbs import VERBS, module_of
+from lira.tools.verbs.operation import up
+
+SETUP = Setup(
+    processes=tuple(process.name for process in PROCESSES),
+    world="line",
+    twin=("--world", "line"),
+    robot=("--base", "/dev/ttyS1", "--without", "lidar", "--without", "camera"),
+    policy="camera-expert",
+    folder="runs/mine",
+)
+
+
+# The list
+
+
+@pytest.mark.parametrize("process", PROCESSES, ids=lambda process: process.name)
+def test_every_row_is_a_command_that_its_verb_understands(process):
+    _, dash, module, *words = process.command(SETUP, "python3")
+    assert dash == "-m"
+    if module != "lira.tools":
+        assert module.startswith("lira.tools.lifecycle.")
+        return
+    verb, *arguments = words
+    parser = Parser(allow_abbrev=False)
+    __import__(VERBS[verb].module, fromlist=["add_arguments"]).add_arguments(parser)
+    parser.parse_args(arguments)
+
+
+@pytest.mark.parametrize("process", PROCESSES, ids=lambda process: process.name)
+def test_whatever_could_drive_by_itself_begins_paused(process):
+    words = process.command(SETUP)
+    assert ("--paused" in words) == (process.name in ("learner", "driver"))
+
+
+def test_the_packages_of_a_row_have_an_extra_that_brings_them():
+    assert {package for process in PROCESSES for package in process.packages} <= set(EXTRAS)
+
+
+def test_sets_name_rows_of_the_laptop_and_the_robot_comes_first():
+    by_name = {process.name: process for process in PROCESSES}
+    assert list(SETS) == list(up.SETS)
+    for names in SETS.values():
+        assert all(by_name[name].host is Host.LAPTOP for name in names)
+        assert by_name[names[0]].is_robot
+        assert "monitor" in names
+
+
+def test_a_real_robot_has_no_twin_and_what_is_left_out_is_left_out():
+    assert chosen("look", twin=False, without=["pad"]) == ("monitor", "page")
+    with pytest.raises(ConfigError, match="no process 'learner'"):
+        chosen("look", twin=True, without=["learner"])
+    assert [row.name for row in rows(Setup(processes=("page", "twin")))] == ["twin", "page"]
+
+
+@pytest.mark.parametrize(
+    ("host", "endpoint"),
+    [
+        ("rosbot", "rosbot:7447"),
+        ("192.168.1.20:7000", "192.168.1.20:7000"),
+        ("fe80::1", "[fe80::1]:7447"),
+        ("[fe80::1]", "[fe80::1]:7447"),
+        ("[fe80::1]:7000", "[fe80::1]:7000"),
+    ],
+)
+def test_a_robots_port_is_the_usual_one_unless_it_is_said(host, endpoint):
+    assert endpoint_of(host) == endpoint
+
+
+def test_what_is_learned_is_kept_by_method_and_place():
+    assert str(run_folder("rosbot", "plus", "line")) == "runs/plus-line"
+    assert str(run_folder("rosbot", "my.methods:Mine", "")) == "runs/my.methods-Mine-rosbot"
+    assert str(run_folder("rosbot", "plus", "worlds/mine.toml")) == "runs/plus-mine"
+
+
+# What `lira up` understands
+
+
+def asked(*words):
+    parser = argparse.ArgumentParser()
+    up.add_arguments(parser)
+    return up.setup_of(parser.parse_args(words))
+
+
+def test_a_twin_is_the_usual_and_of_the_worlds_experiment():
+    setup = asked("--world", "line-obstacles", "--layout", "3")
+    assert setup.processes == SETS["teach"]
+    assert setup.twin[:4] == ("--world", "line-obstacles", "--profile", "thesis-sim")
+    assert setup.folder.endswith("runs/plus-line-obstacles")
+
+
+def test_a_policy_makes_it_the_set_that_drives():
+    assert asked("--policy", "camera-expert").processes == SETS["drive"]
+
+
+def test_a_real_robot_is_reached_where_it_is():
+    setup = asked("--robot", "rosbot.local")
+    assert (setup.world, setup.twin, setup.endpoint) == ("", (), "rosbot.local:7447")
+    assert "twin" not in setup.processes
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        ["--set", "drive"],
+        ["--set", "look", "--policy", "x"],
+        ["--robot", "r", "--listen", "127.0.0.1:1"],
+        ["--world", "nowhere"],
+        ["--world", "line", "--profile", "nobody"],
+    ],
+)
+def test_what_does_not_go_together_is_refused_before_anything_starts(words):
+    with pytest.raises(ConfigError):
+        asked(*words)
+
+
+def test_a_method_by_which_nobody_learns_is_refused(tmp_path, monkeypatch, capsys):
+    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path))
+    assert main(["up", "--method", "thesis-like"]) == 2
+    assert list(tmp_path.iterdir()) == []
+
+
+# When one is started again
+
+
+def test_pauses_double_and_have_an_end():
+    assert [pause_s(failures) for failures in range(7)] == [0.0, 1.0, 2.0, 4.0, 8.0, 16.0, LONGEST_S]
+    assert pause_s(10**6) == LONGEST_S
+
+
+def test_who_dies_again_and_again_waits_longer_and_who_ran_well_does_not():
+    life, now_s = Restarts(10.0), 0.0
+    waits = []
+    for ran_s in (1.0, 1.0, CALM_S, 1.0):
+        assert life.is_due(now_s)
+        life.started(now_s)
+        life.ready(now_s)
+        now_s += ran_s
+        waits.append(life.ended(now_s))
+        assert not life.is_due(now_s)
+        now_s += waits[-1]
+    assert waits == [1.0, 2.0, 1.0, 2.0]
+    assert life.starts == 4
+
+
+def test_who_is_silent_is_hung_and_who_is_heard_is_not():
+    life = Restarts(10.0)
+    life.started(0.0)
+    life.ready(5.0)
+    assert not life.is_hung(15.0)
+    life.alive(15.0)
+    assert not life.is_hung(25.0)
+    assert life.is_hung(25.1)
+
+
+def test_who_never_gets_ready_is_hung_too():
+    life = Restarts(10.0)
+    life.started(0.0)
+    assert not life.is_hung(READY_S)
+    assert life.is_hung(READY_S + 0.1)
+    life.stopped(READY_S)
+    assert not life.is_hung(READY_S + 1e6)
+    assert not life.is_due(1e6)
+
+
+# What is written down
+
+
+@pytest.fixture
+def state_folder(tmp_path, monkeypatch):
+    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path))
+    folder = StateFolder("rosbot")
+    folder.make()
+    return folder
+
+
+def test_a_name_has_one_supervisor_and_everybody_sees_who(state_folder, monkeypatch):
+    monkeypatch.setattr(folders, "LOOK_S", 0.01)
+    assert state_folder.supervisor() is None
+    with state_folder.held():
+        assert folders.names() == ["rosbot"]
+        code = "import sys; from lira.tools.lifecycle.folder import StateFolder\n"
+        code += "print(StateFolder('rosbot').supervisor())"
+        seen = subprocess.run([sys.executable, "-c", code], check=True, capture_output=True, text=True, timeout=30)
+        assert seen.stdout.strip() == str(os.getpid())
+        with pytest.raises(AlreadyUpError, match="'rosbot' is up already"), state_folder.held():
+            pass
+    assert state_folder.supervisor() is None
+    assert folders.names() == []
+
+
+def test_the_folder_is_its_users_alone(state_folder):
+    assert state_folder.path.stat().st_mode & 0o077 == 0
+
+
+def test_a_name_that_is_none_is_refused(state_folder):
+    with pytest.raises(ConfigError):
+        StateFolder("../elsewhere")
+
+
+NOW_S = 1000.0
+ROWS = (
+    ProcessState("twin", "the twin", Phase.RUNS, NOW_S - 90.0, 11, 1, "serves world 'line'"),
+    ProcessState("learner", "learns", Phase.WAITS, NOW_S - 1.0, None, 3, "", "signal SIGKILL"),
+)
+HEARS = Heard(
+    NOW_S - 0.2,
+    (TopicState("scan", 9.7, 10.0, 0.1), TopicState("lira/decision", 0.0, 5.0, None)),
+    "two links each",
+    "disarmed",
+    "paused",
+    "idle",
+    "PAUSED",
+    "It stands.",
+    "P goes on.",
+)
+
+
+def write(folder, pid, processes=ROWS, heard=HEARS):
+    folder.write(STATE, State(SETUP, pid, NOW_S - 300.0, processes))
+    folder.write(HEARD, heard)
+
+
+def test_status_tells_processes_topics_link_and_who_drives(state_folder):
+    with state_folder.held():
+        write(state_folder, state_folder.supervisor())
+        status = look("rosbot", NOW_S)
+        text, told = as_text(status), as_object(status)
+    assert "'rosbot' is up for 5 min: twin in 'line' at 127.0.0.1:7447" in text
+    assert "twin      runs   11  90 s       1  serves world 'line'" in text
+    assert "learner  waits        1 s       3  learns (it ended with signal SIGKILL)" in text
+    assert "scan   9.7     10    0.3" in text  # as old as it was then, and as the note of it is
+    assert "lira/decision" not in text
+    assert text.endswith("link: two links each\ngovernor: disarmed\nPAUSED: It stands. P goes on.")
+    assert (told["up"], told["well"], told["for_s"]) == (True, False, 300.0)
+    assert [row["phase"] for row in told["processes"]] == ["runs", "waits"]
+    assert told["heard"]["age_s"] == 0.2
+    assert told["heard"]["topics"][1]["age_s"] is None
+    json.dumps(told, allow_nan=False)
+
+
+def test_all_is_well_when_all_of_it_runs_and_the_robot_is_heard(state_folder):
+    with state_folder.held():
+        write(state_folder, state_folder.supervisor(), ROWS[:1])
+        assert look("rosbot", NOW_S).is_well
+        old = look("rosbot", NOW_S + 60.0)
+        assert not old.is_well
+        assert "nothing is heard of the robot" in as_text(old)
+
+
+def test_what_an_earlier_supervisor_wrote_is_not_told(state_folder):
+    write(state_folder, 1)
+    assert look("rosbot", NOW_S).state is None
+    with state_folder.held():
+        assert look("rosbot", NOW_S).state is None
+    assert "nothing is up for 'rosbot'" in as_text(look("rosbot", NOW_S))
+
+
+def test_a_record_of_another_version_is_an_error_that_says_which_file(state_folder):
+    with state_folder.held():
+        (state_folder.path / STATE).write_bytes(msgspec.json.encode({"setup": 1}))
+        with pytest.raises(ConfigError, match=STATE):
+            look("rosbot", NOW_S)
+
+
+def test_status_needs_no_bus_and_nothing_heavy(tmp_path):
+    code = "import sys; from lira.tools.cli import main; main(['status', '--json'])\n"
+    code += "print([name for name in ('zenoh', 'numpy', 'cv2', 'torch') if name in sys.modules])"
+    began_s = time.monotonic()
+    done = subprocess.run(
+        [sys.executable, "-c", code],
+        check=True, capture_output=True, text=True, timeout=30, env={"XDG_STATE_HOME": str(tmp_path), "HOME": "/none"},
+    )  # fmt: skip
+    assert done.stdout.splitlines()[-1] == "[]"
+    assert time.monotonic() - began_s < 10.0
+
+
+# Rates and logs
+
+
+def test_a_rate_is_that_of_the_last_seconds():
+    rate = Rate()
+    for tenth in range(100):
+        rate.note(tenth / 10)
+    assert rate.hz(9.9) == pytest.approx(10.0, abs=0.5)
+    assert rate.hz(9.9 + WINDOW_S) == 0.0
+
+
+def test_the_last_lines_of_a_log(tmp_path):
+    log = tmp_path / "x.log"
+    assert last_lines(log, 3) == []
+    log.write_text("".join(f"line {number}\n" for number in range(50_000)))
+    assert last_lines(log, 2) == ["line 49998", "line 49999"]
+    assert last_lines(log, 0) == []
+
+
+def test_following_gives_whole_lines_once_also_of_a_log_that_begins_anew(tmp_path):
+    log = tmp_path / "twin.log"
+    log.write_text("old\n")
+    follower = Follower([log, tmp_path / "later.log"])
+    assert follower.new_lines() == []
+    with log.open("a") as file:
+        file.write("new\nhalf")
+    assert follower.new_lines() == [("twin", "new")]
+    with log.open("a") as file:
+        file.write(" done\n")
+    (tmp_path / "later.log").write_text("first\n")
+    assert follower.new_lines() == [("twin", "half done"), ("later", "first")]
+    log.write_text("anew\n")
+    assert follower.new_lines() == [("twin", "anew")]
+
+
+def test_logs_of_nobody_are_an_error(tmp_path, monkeypatch, capsys):
+    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path))
+    assert main(["logs"]) == 2
+    assert "nothing was ever up as 'rosbot'" in capsys.readouterr().err
+    folder = StateFolder("rosbot")
+    folder.make()
+    folder.log("twin").write_text("one\ntwo\n")
+    folder.log("learner").write_text("three\n")
+    assert main(["logs", "-n", "1"]) == 0
+    assert capsys.readouterr().out == "learner | three\ntwin    | two\n"
+    assert main(["logs", "twin"]) == 0
+    assert capsys.readouterr().out == "one\ntwo\n"
+    assert main(["logs", "page"]) == 2
+
+
+def test_to_take_down_what_is_not_up_is_no_error(tmp_path, monkeypatch, capsys):
+    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path))
+    assert main(["down"]) == 0
+    assert capsys.readouterr().out == "nothing was up for 'rosbot'\n"
+    assert main(["status"]) == 1
+    assert "lira up" in capsys.readouterr().out
+
+
+def test_the_verbs_stand_in_the_table():
+    assert {VERBS[name].module for name in ("up", "status", "logs", "down")} == {
+        module_of("operation", name) for name in ("up", "status", "logs", "down")
+    }
