@@ -1,8 +1,8 @@
 """Who commands from a ROS graph, and how old a command is when it comes. Pure; every time comes in as an argument.
 
-A sample of rmw_zenoh says who sent it and when, on the clock of the sender's machine, and a TwistStamped besides when it
-was decided. So a command that a link held back is told from a fresh one, and every publisher is a commander of its own
-to the robot, as if it were on the bus itself.
+A sample of rmw_zenoh says who sent it and when, on the clock of the sender's machine, and a TwistStamped besides when
+it was decided. So a command that a link held back is told from a fresh one, and every publisher is a commander of its
+own to the robot, as if it were on the bus itself.
 """
 
 from collections import OrderedDict

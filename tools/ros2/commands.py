@@ -1,8 +1,7 @@
 """What a ROS graph commands, passed on to the robot: velocities with and without a stamp, and the emergency stop."""
 
 import sys
-from collections.abc import Callable
-from dataclasses import dataclass, replace
+from typing import Protocol
 
 from lira.hal.bus.attachment import Attachment
 from lira.hal.bus.bus import Bus
@@ -15,48 +14,79 @@ from lira.hal.ros_graph.node import RosNode
 from lira.tools.ros2.commanders import Commanders
 
 DEPTH = 32
-LARGEST_STAMPED = 1024  # bytes: a TwistStamped has a frame's name besides
+STAMPED_BYTES = 1024  # a TwistStamped has the name of a frame besides
+NO_ROBOT = "the robot is not heard"
+
+
+class RobotTime(Protocol):
+    """The robot's clock at a time of this machine's monotonic one; None while the robot is not heard."""
+
+    def __call__(self, local_s: float) -> float | None:
+        """Return it."""
 
 
 class Commands:
-    """Relays commands; `now` is the robot's clock, None while it is not known.
+    """Relays commands. Each publisher in the graph stays a commander of its own, with the age that its commands have.
 
-    A hand's zero means that it lets go, as it does on the bus from who cannot say so in another way.
+    A hand's zero means that it lets go, as on the bus from whoever cannot say so in another way.
     """
 
-    def __init__(self, bus: Bus, node: RosNode, salt: bytes) -> None:
-        self._ways = [
-            _Way(bus, node, topic, Commanders(salt + topic.key.encode()), let_go=topic is TELEOP)
-            for topic in (CMD_VEL, TELEOP)
-        ]
-        self._node = node
+    def __init__(self, bus: Bus, node: RosNode, salt: bytes, robot_time: RobotTime) -> None:
+        commanders = Commanders(salt)
+        self._ways = [_Way(bus, node, topic, commanders, robot_time) for topic in (CMD_VEL, TELEOP)]
+        self._robot_time = robot_time
         self._estop = node.reader(ESTOP, DEPTH)
         self._press: Publisher[Bool] = bus.publisher(ESTOP)
 
-    def relay(self, now: Callable[[float], float | None]) -> None:
-        """Pass on what came; `now` returns the robot's time at a time of this machine's monotonic clock."""
-        if self._estop.full or any(received.message.data for received in self._estop.poll()):
+    def relay(self) -> None:
+        """Pass on what came."""
+        pressed = any(received.message.data for received in self._estop.poll())
+        if pressed or self._estop.full:  # one that was lost may have been a press
             self._press.put(Bool(True), 0.0)
         for way in self._ways:
-            way.relay(now)
+            way.relay()
 
 
 class _Way:
     """One topic of commands."""
 
-    def __init__(self, bus: Bus, node: RosNode, topic: Topic[Twist], commanders: Commanders, *, let_go: bool) -> None:
-        stamped = replace(topic, kind=TwistStamped, max_bytes=LARGEST_STAMPED)
+    def __init__(
+        self, bus: Bus, node: RosNode, topic: Topic[Twist], commanders: Commanders, robot_time: RobotTime
+    ) -> None:
         self._key = topic.key
+        self._hand = topic is TELEOP
         self._commanders = commanders
-        self._let_go = let_go
-        self._plain: Reader[Twist] = node.reader(topic, DEPTH)
-        self._stamped: Reader[TwistStamped] = node.reader(stamped, DEPTH)
+        self._robot_time = robot_time
         self._boundary = node.boundary
-        self._epoch = 0
+        self._plain: Reader[Twist] = node.reader(topic, DEPTH)
+        stamped: Topic[TwistStamped] = Topic(
+            topic.key, TwistStamped, topic.rate_hz, topic.max_age_s, topic.qos, STAMPED_BYTES
+        )
+        self._stamped = node.reader(stamped, DEPTH)
+        self._epoch = 0  # in whose name the next is sent
         self._publisher: Publisher[Twist] = bus.publisher(topic, attach=self._attach)
 
-    def relay(self, now: Callable[[float], float | None]) -> None:
+    def relay(self) -> None:
         for plain in self._plain.poll():
-            self._pass(plain, plain.message, 0.0, now)
+            self._pass(plain, plain.message, 0.0)
         for stamped in self._stamped.poll():
-            self._pass(stamped, stamped.message.twist, stamped.message.stamp_s, now)
+            self._pass(stamped, stamped.message.twist, stamped.message.stamp_s)
+
+    def _pass(self, received: Received[Twist] | Received[TwistStamped], twist: Twist, stamp_s: float) -> None:
+        with self._boundary.guard(self._key):
+            now_s = self._robot_time(received.arrived_s)
+            order = self._commanders.judge(parse_rmw_attachment(received.attached), stamp_s, received.arrived_s)
+            if isinstance(order, str) or now_s is None:
+                self._refuse(order if isinstance(order, str) else NO_ROBOT)
+                return
+            self._epoch = order.epoch
+            released = self._hand and is_neutral(twist)
+            self._publisher.put(twist, now_s - order.age_s, seq=order.seq, released=released)
+
+    def _refuse(self, reason: str) -> None:
+        if (self._key, reason) not in self._boundary.counts:
+            print(f"a command on '{self._key}' is not passed on: {reason}", file=sys.stderr, flush=True)
+        self._boundary.refuse(self._key, reason)
+
+    def _attach(self, time_s: float, seq: int | None, answers: int, *, released: bool) -> bytes:
+        return Attachment(self._epoch, seq or 0, round(time_s * 1e9), answers, released).to_bytes()
