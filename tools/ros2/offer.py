@@ -4,9 +4,9 @@ It is a process of its own, so that nothing in it costs the robot's control anyt
 other: what ROS commands is judged by the governor there, under the lease, and ends when this process does.
 """
 
+import itertools
 import secrets
 import threading
-import time
 from collections.abc import Callable
 from contextlib import ExitStack
 
@@ -22,7 +22,7 @@ from lira.tools.ros2.services import Services
 from lira.tools.ros2.telemetry import Telemetry, said_by
 
 RELAY_S = 0.005
-LOOK_S = 0.5  # how soon who begins to listen is served
+TELEMETRY_TURNS, LOOK_TURNS = 2, 100  # how many turns what is heard may wait, and whoever begins to listen
 LOST_S = 1.0  # a robot that was not heard for so long may have another clock
 FIND_S = 60.0  # a robot opens its devices first
 
@@ -46,13 +46,14 @@ class Offer:
         """Relay until `stop` is set. Raises `BusError` when one of the sessions is closed."""
         services = threading.Thread(target=self._services.run, args=(stop,), name="services", daemon=True)
         services.start()
-        look_s = 0.0
-        while not stop.wait(RELAY_S):
+        for turn in itertools.count():
+            if stop.wait(RELAY_S):
+                return
             self._listen()
             self._commands.relay()
-            self._telemetry.relay()
-            if time.monotonic() >= look_s:
-                look_s = time.monotonic() + LOOK_S
+            if turn % TELEMETRY_TURNS == 0:
+                self._telemetry.relay()
+            if turn % LOOK_TURNS == 0:
                 self._telemetry.look()
 
     def _listen(self) -> None:
