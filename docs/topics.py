@@ -3,6 +3,7 @@
 from zenoh import Reliability
 
 from lira.hal.bus.topics import TOPICS, Qos, Topic
+from lira.hal.messages.codec import ros_type_of
 from lira.hal.messages.ros_types import TYPES
 
 
@@ -14,7 +15,9 @@ def topic_table() -> str:
 
 def hash_table() -> str:
     """Return one row for each type on the bus."""
-    types = sorted({topic.ros_type for topic in TOPICS})
+    types = sorted(
+        {topic.ros_type for topic in TOPICS} | {ros_type_of(topic.stamped) for topic in TOPICS if topic.stamped}
+    )
     return "| type | RIHS01 |\n|---|---|\n" + "".join(f"| `{name}` | `{_hash(name)}` |\n" for name in types)
 
 
@@ -22,7 +25,7 @@ def _row(topic: Topic[object]) -> str:
     age = "never" if topic.max_age_s == float("inf") else f"{topic.max_age_s:g} s"
     cells = [
         f"`{topic.key}`",
-        f"`{topic.ros_type}`",
+        f"`{topic.ros_type}`" + ("" if topic.stamped is None else f" or `{topic.stamped.__name__}`"),
         f"{topic.rate_hz:g}" if topic.rate_hz else "once",
         age,
         _size(topic.max_bytes),

@@ -7,12 +7,13 @@ runs evenly and never back, whatever is done to the time of day. Clients trust n
 import time
 from collections import deque
 from collections.abc import Callable
+from operator import itemgetter
 
 # A clock that shows this much counts from 1970 already: no machine is up for thirty years.
 COUNTS_FROM_1970_S = 1e9
 TRIES = 5
-# Long enough for one prompt message among late ones, short enough to follow a robot whose time runs slower.
-WINDOW_S = 0.25
+WINDOW_S = 0.25  # long enough for one prompt message among late ones
+RATE_S = 1.0  # over so long it is measured how fast the robot's time passes
 # An estimate of another's clock lags. A stamp further ahead than this is not honest, and could keep what is old alive.
 AHEAD_S = 0.1
 LEAP_S = 0.5  # a clock that runs as ours or slower never leaps; a link that was slow from the first on gains no more
@@ -56,11 +57,13 @@ class ClockEstimate:
 
     The most prompt message of the last moments sets the offset, so the estimate is late by the shortest delay and a
     command stamped with it never looks younger than it is. It never runs back, so a time that leaps ahead of all before
-    is not taken at once: one such message would hold the estimate for ever.
+    is not taken at once: one such message would hold the estimate for ever. Between messages it goes on as fast as the
+    robot's time was measured to pass, but no faster than ours: a twin may be slowed down, or too slow for its machine.
     """
 
     def __init__(self) -> None:
         self._offsets: deque[tuple[float, float]] = deque()
+        self._rate = 1.0
         self._latest_s = float("-inf")
         self._highest_s = float("inf")  # offset ever since the start
         self._believed_s = float("-inf")
@@ -101,18 +104,42 @@ class ClockEstimate:
         self._believed_s = local_s
         self._highest_s = offset_s if self._highest_s == float("inf") else max(self._highest_s, offset_s)
         self._offsets.append((local_s, offset_s))
-        while self._offsets[0][0] < local_s - WINDOW_S:
+        while self._offsets[0][0] < local_s - RATE_S:
             self._offsets.popleft()
+        self._rate = self._measured(local_s)
 
     def restart(self) -> None:
         """Forget all: the robot was started anew and its clock with it."""
         self._offsets.clear()
+        self._rate = 1.0
         self._latest_s, self._highest_s = float("-inf"), float("inf")
 
     def now(self, local_s: float) -> float:
         """Seconds on the robot's clock at `local_s`; only when `known`."""
-        self._latest_s = max(self._latest_s, local_s + max(offset_s for _, offset_s in self._offsets))
+        behind = 1.0 - self._rate
+        newest_s = self._offsets[-1][0]
+        self._latest_s = max(
+            self._latest_s,
+            *(
+                local_s + offset_s - behind * (local_s - heard_s)
+                for heard_s, offset_s in self._offsets
+                if heard_s >= newest_s - WINDOW_S
+            ),
+        )
         return self._latest_s
+
+    def _measured(self, local_s: float) -> float:
+        """How fast the robot's time passes, at most 1, by the most prompt messages of now and of the beginning.
+
+        Delays that grow make it too slow, which is the safe side.
+        """
+        began_s = self._offsets[0][0]
+        span_s = min(WINDOW_S, 0.5 * (local_s - began_s))
+        then_s, then = max((each for each in self._offsets if each[0] <= began_s + span_s), key=itemgetter(1))
+        now_s, now = max((each for each in self._offsets if each[0] >= local_s - span_s), key=itemgetter(1))
+        if now_s <= then_s:
+            return 1.0
+        return min(1.0, max(0.0, 1.0 + (now - then) / (now_s - then_s)))
 
 
 def is_fresh(stamp_s: float, now_s: float, max_age_s: float) -> bool:

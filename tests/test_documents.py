@@ -79,6 +79,8 @@ def test_links_lead_to_a_page_and_a_heading(page):
         target = (page.parent / name).resolve() if name else page
         assert target.exists(), f"{shown(page)} links to {link}"
         assert not anchor or anchor in anchors(target), f"{shown(page)} links to {link}"
+        on_site = not page.is_relative_to(DOCS) or target.is_relative_to(DOCS)
+        assert on_site, f"{shown(page)} links to {link}, which the site has not: name the file"
 
 
 @pytest.mark.parametrize("page", PAGES, ids=shown)

@@ -47,6 +47,13 @@ def add_server(parser: argparse.ArgumentParser) -> None:
     add("--insecure", action="store_true", help="let other machines in without keys (see lira keys)")
 
 
+def add_record(parser: argparse.ArgumentParser) -> None:
+    """Declare `--no-record`."""
+    parser.add_argument(
+        "--no-record", action="store_true", help="do not record the bus into the folder of the run (see lira record)"
+    )
+
+
 def add_profile(parser: argparse.ArgumentParser, default: str, what: str = "robot") -> None:
     """Declare `--profile`."""
     parser.add_argument("--profile", default=default, help=f"{what} by name or .toml file {DEFAULT}")

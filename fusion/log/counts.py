@@ -3,6 +3,7 @@
 from collections import Counter
 
 import msgspec
+from msgspec.structs import asdict
 
 from lira.fusion.methods.base import Choice, Lesson
 from lira.hal.messages import Call, Driver, LabelCounts
@@ -33,6 +34,9 @@ class Account(msgspec.Struct, frozen=True):
     stored: dict[str, int] = {}
 
 
+NOTHING = Account()
+
+
 class Ledger:
     """Counts over a session. An intervention is a maximal run of steps with the human in control.
 
@@ -51,8 +55,8 @@ class Ledger:
         self._choices = 0
         self.new_episode()
 
-    def go_on(self, labels: LabelCounts, interventions: int, calls: int) -> None:
-        """Count on from where another session has ended."""
+    def go_on(self, labels: LabelCounts, interventions: int, calls: int, account: Account = NOTHING) -> None:
+        """Count on from where another session has ended. Labels of the `account` are those of `labels`."""
         before = ((Driver.HUMAN, "human"), (Driver.MEAN, "expert"))
         for source, name in before:
             self._given[source] += getattr(labels, f"given_{name}")
@@ -61,6 +65,7 @@ class Ledger:
         self._stored[DEMONSTRATION] += labels.demonstration
         self.interventions += interventions
         self.calls += calls
+        self._count.update({name: value for name, value in asdict(account).items() if isinstance(value, int)})
 
     def take_back(self, source: str, count: int) -> None:
         """So many stored labels of a source were taken back; the demonstration's go last."""

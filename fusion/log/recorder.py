@@ -42,6 +42,12 @@ class Journal:
         self._learned: list[tuple[int, int, float]] = []  # place in the log, lap and time of those that were stored
         self._reserved: dict[int, tuple[Proposal, Demonstration]] = {}  # the proposal too: so its id stays its own
 
+    def aside(self, write: Callable[[Record], None]) -> "Journal":
+        """One for another robot of the same run: the same counts and beginning, and nobody hears of its decisions."""
+        journal = Journal(write=write)
+        journal.ledger, journal._began_s = self.ledger, self._began_s
+        return journal
+
     @property
     def elapsed_s(self) -> float:
         """Wall-clock time since the journal was opened."""

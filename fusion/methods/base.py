@@ -5,6 +5,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Protocol, runtime_checkable
 
+from lira.fusion.learning.labels import Label
 from lira.fusion.learning.learned_policy import UNTAUGHT, LearnedPolicy
 from lira.fusion.preprocess import Features
 from lira.hal.messages import Action, Call, Driver, ExpertView, Phase
@@ -119,6 +120,10 @@ class Method(ABC):
     def update(self, now_s: float) -> None:
         """Train if it is time to, and adopt what training has brought by now."""
         self.novice.update(now_s)
+
+    def remember(self, label: Label) -> None:
+        """Take in a label that an earlier session stored."""
+        self.novice.remember(label)
 
     @abstractmethod
     def propose(self, features: Features) -> Proposal:

@@ -1,6 +1,6 @@
 """A course of teaching on a twin: laps with the teacher, a proving run after each, then layouts never seen."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field
 from typing import Literal, Protocol
 
@@ -167,7 +167,7 @@ class Session:
         """Proving runs after a lap, whatever becomes of the others."""
         return [self._alone(drives, Phase.PROVE, lap) for drives in runs]
 
-    def show(self, drives: Sequence[Drive], teacher: Teacher | None = None) -> list[LapRecord]:
+    def show(self, drives: Iterable[Drive], teacher: Teacher | None = None) -> list[LapRecord]:
         """Let the frozen novice drive, each drive a lap of its own; after a crash it goes on behind it.
 
         The teacher, if there is one, answers a robot that stands in doubt, and takes control as it would in training.

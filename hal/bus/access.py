@@ -21,6 +21,7 @@ from lira.hal.bus.topics import (
     TOPICS,
     named,
 )
+from lira.hal.rmw.tokens import ALL_BRIDGES
 
 _PUT = ["put", "delete"]
 _ASK = ["query", "liveliness_query", "declare_subscriber", "declare_liveliness_subscriber"]
@@ -37,9 +38,9 @@ def access_list(robot: str, roles: Mapping[str, Role] | None) -> dict[str, Any]:
     said = [topic.key for topic in TOPICS if topic not in COMMANDS]
     told = [topic.key for topic in FROM_OPERATORS]
     rules = {
-        "answered": _rule([*_ASK, *_ANSWER], _OUT, _EVERYTHING),
+        "answered": _rule([*_ASK, *_ANSWER], _OUT, [*_EVERYTHING, ALL_BRIDGES]),
         "said": _rule(_PUT, _OUT, _below(robot, *said, latched=True)),
-        "listen": _rule(["declare_subscriber", *_ASK[1:]], _IN, _EVERYTHING),
+        "listen": _rule(["declare_subscriber", *_ASK[1:]], _IN, [*_EVERYTHING, ALL_BRIDGES]),
         "look": _rule(["query"], _IN, [*_below(robot, INFO, ESTOP_LOOK, ESTOP_PRESS), f"{robot}/**/@adv/**"]),
         "operate": _rule(["query"], _IN, _below(robot, ESTOP_RELEASE, RESET)),
         "tell": _rule(_PUT, _IN, _below(robot, *told, latched=True)),

@@ -1,8 +1,10 @@
 """What rides beside every payload of ours: who sent it, in which order, when, and what it answers."""
 
 import struct
+from collections.abc import Iterator
 from dataclasses import dataclass
 
+from lira.hal.clock import TimeBase
 from lira.hal.errors import CodecError
 
 MAGIC = b"LIR1"
@@ -49,3 +51,18 @@ def parse_attachment(data: bytes | None) -> Attachment | None:
     if seq not in _COUNTS or time_ns not in _TIMES or not (answers == -1 or answers in _COUNTS):
         raise CodecError(f"an attachment of seq {seq}, {time_ns} ns, answers {answers} is out of bounds")
     return Attachment(epoch, seq, time_ns, answers, bool(flags & _RELEASED))
+
+
+def attach(
+    epoch: int,
+    count: Iterator[int],
+    base: TimeBase,
+    time_s: float,
+    seq: int | None,
+    answers: int,
+    *,
+    released: bool,
+) -> bytes:
+    """Make one for a session that counts what it sends and tells times by its `base`; `seq` instead of the count."""
+    number = next(count) if seq is None else seq
+    return Attachment(epoch, number, round(time_s * 1e9) + base.offset_ns, answers, released).to_bytes()

@@ -14,9 +14,9 @@ from typing import Any, TypeVar
 import zenoh
 
 from lira.hal.bus.access_log import Refusals
-from lira.hal.bus.attachment import Attachment
+from lira.hal.bus.attachment import attach as attached
 from lira.hal.bus.boundary import Boundary
-from lira.hal.bus.connection import Connection
+from lira.hal.bus.connection import Connection, Declared
 from lira.hal.bus.endpoint import DEFAULT_ROBOT, check_address, check_name, is_loopback
 from lira.hal.bus.expiry import Reminder
 from lira.hal.bus.keys import Keys, keys_from_environment, load_keys
@@ -27,6 +27,8 @@ from lira.hal.bus.topics import COMMANDS, Qos, Topic, named
 from lira.hal.bus.zenoh_session import open_session
 from lira.hal.clock import TimeBase, unix_offset_s
 from lira.hal.errors import BusError, ConfigError
+from lira.hal.rmw.services import TRIGGER
+from lira.hal.rmw.tokens import Kind, Route
 
 M = TypeVar("M")
 
@@ -74,6 +76,7 @@ class Bus:
         self.refusals = refusals or Refusals()
         self.boundary = Boundary()
         self._time_base = TimeBase()
+        self._announced: list[Declared[Any]] = []
         self._counts: dict[str, Iterator[int]] = {}  # what was sent, by key: they grow whoever sends
         keys = keys or keys_from_environment()
         self.encrypted = keys is not None
@@ -113,8 +116,9 @@ class Bus:
     def publisher(self, topic: Topic[M], qos: Qos | None = None, attach: Attach | None = None) -> Publisher[M]:
         """Declare a publisher; `qos` replaces the table's, `attach` what is attached: for who speaks for others."""
         key = self._key(self._own(topic).key)
-        own = partial(_attach, self.epoch, self._counts.setdefault(key, itertools.count(1)), self._time_base)
-        return Publisher(self._connection, key, topic, qos or topic.qos, attach or own, self._time_base)
+        base = self._time_base
+        own = partial(attached, self.epoch, self._counts.setdefault(key, itertools.count(1)), base)
+        return Publisher(self._connection, key, topic, qos or topic.qos, attach or own, base)
 
     def put_raw(self, topic: Topic[Any], payload: bytes, attachment: bytes | None = None) -> None:
         """Send bytes as they are: for relays, recorders and tests of what a bus has to bear."""
@@ -137,6 +141,14 @@ class Bus:
     def questions(self, key: str) -> Questions:
         """Answer queries on a key."""
         return Questions(self._connection, self._key(key), key, self.boundary, self.epoch)
+
+    def announce(self, topic: Topic[Any]) -> None:
+        """Make a topic known to bridges to ROS 2, so that `ros2 topic list` shows it before anybody listens."""
+        self._announce(Kind.PUBLISHER, topic.key, topic.ros_type, latched=topic.qos.latched)
+
+    def announce_service(self, key: str) -> None:
+        """Make known to bridges that queries on a key are answered as a `Trigger`: without, they pass none on."""
+        self._announce(Kind.SERVICE, key, TRIGGER)
 
     def ask(self, key: str, payload: bytes = b"", timeout_s: float = 5.0) -> bytes:
         """Query a key and return the answer; asks again while nobody is there to answer.
@@ -182,9 +194,13 @@ class Bus:
 
     def short_peers(self) -> int:
         """How many peers have less than two links, so that their UDP does not get through. Watchers need but one."""
+        return len(self.short_sessions())
+
+    def short_sessions(self) -> frozenset[str]:
+        """The ids of these peers' sessions."""
         session = self._session
         counts = Counter(str(link.zid) for link in session.info.links())
-        return sum(counts[str(zid)] < LINKS_PER_PEER for zid in session.info.peers_zid())
+        return frozenset(zid for zid in map(str, session.info.peers_zid()) if counts[zid] < LINKS_PER_PEER)
 
     def close(self, timeout_s: float = CLOSE_S) -> bool:
         """Close the session; False if a dead link kept it from closing in time. May be called twice."""
@@ -195,6 +211,13 @@ class Bus:
     @property
     def _session(self) -> zenoh.Session:
         return self._connection.session
+
+    def _announce(self, kind: Kind, key: str, ros_type: str, *, latched: bool = False) -> None:
+        def declare(session: zenoh.Session) -> Any:
+            route = Route(str(session.zid()), kind, self._key(key), ros_type, latched)
+            return session.liveliness().declare_token(route.token)
+
+        self._announced.append(self._connection.declare(declare))
 
     def _keys_changed(self) -> bool:
         return self._keys is not None and self._keys.changed()
@@ -211,17 +234,3 @@ class Bus:
 
     def _key(self, key: str) -> str:
         return f"{self._prefix}/{key}" if self._prefix else key
-
-
-def _attach(
-    epoch: int,
-    count: Iterator[int],
-    base: TimeBase,
-    time_s: float,
-    seq: int | None,
-    answers: int,
-    *,
-    released: bool,
-) -> bytes:
-    number = next(count) if seq is None else seq
-    return Attachment(epoch, number, round(time_s * 1e9) + base.offset_ns, answers, released).to_bytes()

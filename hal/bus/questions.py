@@ -1,4 +1,8 @@
-"""Queries and their answers. Each query carries a number that nobody can know before, and so does its answer."""
+"""Queries and their answers. Each query carries a number that nobody can know before, and so does its answer.
+
+A ROS peer asks in its own way: a query without our attachment whose payload is CDR is a request of std_srvs/Trigger, as
+zenoh-bridge-ros2dds passes it on, and is answered as one.
+"""
 
 import secrets
 import time
@@ -15,11 +19,14 @@ from lira.hal.bus.connection import Connection
 from lira.hal.bus.reader import take
 from lira.hal.bus.topics import QUESTION_BYTES
 from lira.hal.errors import CodecError
+from lira.hal.rmw.services import TRIGGER, encode_answer
+from lira.hal.rmw.services import Answer as TriggerAnswer
 
 QUESTIONS = 256  # that wait at most; each round answers no more
 SHOWN_REASON = 300  # characters of why a question was refused
 NONCE_BITS = 62
 POLL_S = 0.0005
+CDR_STARTS = (b"\x00\x00\x00\x00", b"\x00\x01\x00\x00")
 
 
 @dataclass(frozen=True, slots=True)
@@ -31,33 +38,51 @@ class Answer:
 
 
 class Question:
-    """A query that waits for its answer, which names the session (`epoch`) that gives it, and what it answers."""
+    """A query that waits for its answer, which names the session (`epoch`) that gives it, and what it answers.
+
+    `payload` is JSON, what a ROS peer asks with an empty object: a `Trigger` says nothing more.
+    """
 
     def __init__(self, query: zenoh.Query, epoch: int) -> None:
         self._query = query
         self._epoch = epoch
-        self.payload = b"" if query.payload is None else bytes(query.payload)
+        self._asked = _attachment(query)
+        payload = b"" if query.payload is None else bytes(query.payload)
+        self._by_ros = self._asked is None and payload.startswith(CDR_STARTS)
+        self.payload = b"{}" if self._by_ros else payload
         self.answered = False
 
     def answer(self, payload: bytes) -> None:
-        """Reply, and be done with it."""
-        asked = _attachment(self._query)
-        nonce = 0 if asked is None else asked.seq
+        """Reply with JSON, and be done with it."""
+        if self._by_ros:
+            self._trigger(TriggerAnswer(True, payload.decode()))
+            return
         self.answered = True
+        nonce = 0 if self._asked is None else self._asked.seq
         with self._query as query:
             query.reply(query.key_expr, payload, attachment=Attachment(self._epoch, nonce, 0).to_bytes())
 
     def refuse(self, why: str) -> None:
         """Reply that it cannot be done, and why."""
+        why = why[:SHOWN_REASON]
+        if self._by_ros:  # an error would leave its client waiting
+            self._trigger(TriggerAnswer(False, why))
+            return
         self.answered = True
         with self._query as query:
-            query.reply_err(why[:SHOWN_REASON].encode())
+            query.reply_err(why.encode())
+
+    def _trigger(self, answer: TriggerAnswer) -> None:
+        self.answered = True
+        with self._query as query:
+            query.reply(query.key_expr, encode_answer(TRIGGER, answer))
 
 
 class Questions:
     """The queries on a key. Of those that nobody has looked at the newest `QUESTIONS` stay, and nobody waits.
 
-    `told` is the key as the `boundary` counts it.
+    `told` is the key as the `boundary` counts it. Who asks several keys at once does not get here: the access list lets
+    through what names this one.
     """
 
     def __init__(self, connection: Connection, key: str, told: str, boundary: Boundary, epoch: int) -> None:

@@ -98,9 +98,11 @@ class Reader(Generic[M]):
             self._boundary.refuse(self._topic.key, "too long")
             return None
         payload, beside = bytes(sample.payload), None if attached is None else bytes(attached)
-        message, sent, arrived_s = decode(self._topic.kind, payload), parse_attachment(beside), time.monotonic()
+        message = decode(_kind_of(self._topic, len(payload)), payload)
+        sent, arrived_s = parse_attachment(beside), time.monotonic()
         if self._base.offset_s:
-            message = shifted(message, -self._base.offset_s)
+            if getattr(message, "stamp_s", 0.0) != 0.0:  # ROS's word for none
+                message = shifted(message, -self._base.offset_s)
             sent = None if sent is None else replace(sent, time_ns=sent.time_ns - self._base.offset_ns)
         return Received(message, sent, arrived_s, str(sample.key_expr), self._sender(sample), payload, beside)
 
@@ -198,3 +200,8 @@ class Tap:
 def _all_below(key: str, session: zenoh.Session) -> Any:
     ring: RingChannel[zenoh.Sample] = RingChannel(DEPTH)
     return session.declare_subscriber(key, ring)
+
+
+def _kind_of(topic: Topic[Any], size: int) -> type[Any]:
+    """What a payload of this size is to be decoded as."""
+    return topic.kind if topic.stamped is None or size <= topic.plain_bytes else topic.stamped

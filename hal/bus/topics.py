@@ -23,6 +23,7 @@ from lira.hal.messages import (
     Joy,
     JoyFeedback,
     LaserScan,
+    MethodCalls,
     Odometry,
     OperatorAnswer,
     OperatorRequest,
@@ -31,6 +32,7 @@ from lira.hal.messages import (
     Text,
     Transforms,
     Twist,
+    TwistStamped,
 )
 from lira.hal.messages.codec import fixed_bytes, ros_type_of
 
@@ -63,7 +65,9 @@ IN_LOCKSTEP = Qos(Reliability.RELIABLE, Priority.DATA, express=True, wait=True)
 PICTURE_BYTES = 2 * 2**20
 SCAN_BYTES = 160 * 2**10  # of `hal.bounds.MOST_BEAMS` beams with intensities
 REPORT_BYTES = 64 * 2**10
+CALLS_BYTES = 256 * 2**10  # what a method saw in a step, or some labels from before
 SMALL_BYTES = 2 * 2**10  # numbers, a header and a few short texts
+COMMAND_BYTES = 256  # a TwistStamped whose frame has a name
 ATTACHMENT_BYTES = 256  # ours and those of ROS peers
 QUESTION_BYTES = 4 * 2**10
 MESSAGE_BYTES = 4 * 2**20  # of anything at all
@@ -71,7 +75,10 @@ MESSAGE_BYTES = 4 * 2**20  # of anything at all
 
 @dataclass(frozen=True, slots=True)
 class Topic(Generic[M]):
-    """One line of the table. `max_bytes`: no payload is longer. A rate of 0: once, when the robot starts."""
+    """One line of the table. `max_bytes`: no payload is longer. A rate of 0: once, when the robot starts.
+
+    `stamped`: a ROS peer may send that instead, which is longer than any of `kind`, and than `plain_bytes`.
+    """
 
     key: str
     kind: type[M]
@@ -79,6 +86,8 @@ class Topic(Generic[M]):
     max_age_s: float
     qos: Qos
     max_bytes: int = SMALL_BYTES
+    stamped: type[Any] | None = None
+    plain_bytes: int = 0
 
     @property
     def ros_type(self) -> str:
@@ -101,8 +110,8 @@ TF_STATIC = Topic("tf_static", Transforms, 0.0, float("inf"), LATCHED, REPORT_BY
 DESCRIPTION = Topic("robot_description", Text, 0.0, float("inf"), LATCHED, REPORT_BYTES)
 CAMERA_INFO = Topic("camera/color/camera_info", CameraInfo, 30.0, 0.3, REPORT)  # with each picture
 DEPTH_INFO = Topic("camera/depth/camera_info", CameraInfo, 5.0, 0.6, REPORT)
-CMD_VEL = Topic("cmd_vel", Twist, 20.0, 0.3, URGENT, fixed_bytes(STOP))
-TELEOP = Topic("cmd_vel/teleop", Twist, 30.0, 0.2, URGENT, fixed_bytes(STOP))
+CMD_VEL = Topic("cmd_vel", Twist, 20.0, 0.3, URGENT, COMMAND_BYTES, TwistStamped, fixed_bytes(STOP))
+TELEOP = Topic("cmd_vel/teleop", Twist, 30.0, 0.2, URGENT, COMMAND_BYTES, TwistStamped, fixed_bytes(STOP))
 APPLIED = Topic("cmd_vel/applied", Applied, 20.0, 0.3, URGENT)
 ESTOP = Topic("estop", Bool, 1.0, float("inf"), LATCHED, fixed_bytes(Bool(False)))  # true presses
 JOY = Topic("joy", Joy, 30.0, 0.2, SENSOR)
@@ -110,6 +119,7 @@ JOY_FEEDBACK = Topic("joy/feedback", JoyFeedback, 10.0, 0.2, REPORT)
 OPERATOR = Topic("operator", OperatorRequest, 5.0, 1.0, REPORT)  # asked later than this counts for nothing
 OPERATOR_ANSWER = Topic("operator/answer", OperatorAnswer, 1.0, 3.0, REPORT, REPORT_BYTES)
 DECISION = Topic("lira/decision", Decision, 5.0, 1.0, REPORT, REPORT_BYTES)
+METHOD = Topic("lira/method", MethodCalls, 5.0, 1.0, REPORT, CALLS_BYTES)
 SESSION = Topic("lira/session", SessionState, 1.0, 3.0, REPORT, REPORT_BYTES)
 DIAGNOSTICS = Topic("diagnostics", DiagnosticArray, 1.0, 3.0, REPORT, REPORT_BYTES)
 SIM_STATE = Topic("sim/state", CourseState, 20.0, 0.3, SENSOR)
@@ -137,6 +147,7 @@ TOPICS: tuple[Topic[Any], ...] = (
     OPERATOR,
     OPERATOR_ANSWER,
     DECISION,
+    METHOD,
     SESSION,
     DIAGNOSTICS,
     SIM_STATE,
@@ -152,6 +163,7 @@ FROM_OPERATORS: tuple[Topic[Any], ...] = (
     OPERATOR,
     OPERATOR_ANSWER,
     DECISION,
+    METHOD,
     SESSION,
     DIAGNOSTICS,
 )

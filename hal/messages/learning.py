@@ -40,6 +40,7 @@ class Stage(StrEnum):
     DEMONSTRATION = "demonstration"
     TEACHING = "teaching"
     PROVING = "proving"  # the novice alone; a twin tells how it went
+    EXAM = "exam"  # the same on layouts that it has not seen, in a twin of its own
     JUDGING = "judging"  # the novice alone; the person says how it went
     VERDICT = "verdict"  # stop, or go on?
     OVER = "over"
@@ -49,10 +50,10 @@ class Stage(StrEnum):
 class SessionState:
     """How a person's session of teaching goes (`lira/session`): what to do next, and whether it is good already.
 
-    `person` is who teaches and `layout` the twin's, as it is now. Counts go on from day to day; `laps` (of teaching),
-    `passed`, `collisions` and `lost` are of today. `alone` is the share of steps since the demonstration in which no
+    `person` is who teaches and `layout` the twin's, as it is now. Counts go on from day to day: `laps` (of teaching),
+    `passed`, `collisions` and `lost` too. `alone` is the share of steps since the demonstration in which no
     person drove, `curve` the same of each lap. Of `shown` proving laps the novice has passed `proven`. `words` is the
-    newest verdict.
+    newest verdict, and `converged` whether it is that the novice passed.
     """
 
     stamp_s: float
@@ -71,6 +72,7 @@ class SessionState:
     proven: int = 0
     shown: int = 0
     words: str = ""
+    converged: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -81,6 +83,54 @@ class ExpertView:
     action: Action
     activation: float
     active: bool
+
+
+@dataclass(frozen=True, slots=True)
+class FeatureArray:
+    """What a method sees of one sensor, as labels keep it (`fusion.preprocess.Modality.keep`)."""
+
+    name: str
+    data: bytes
+
+
+class CallName(StrEnum):
+    """What a method was asked (`MethodCall`): the functions of `fusion.methods.base.Method`, and its life's ends."""
+
+    BEGIN = "begin"
+    REMEMBER = "remember"  # a label from before
+    UPDATE = "update"
+    PROPOSE = "propose"
+    CHOOSE = "choose"
+    LEARN = "learn"
+    ALONE = "alone"
+    RESET = "reset"
+    END = "end"
+
+
+@dataclass(frozen=True, slots=True)
+class MethodCall:
+    """One call of a method: what it got, and what came of it (`outcome`, JSON).
+
+    `target` is 0 for the method itself, and n for the n-th driver that its `alone` gave. `argument` is the settings as
+    JSON (begin), a label's source (remember), an expert (choose) or a phase (alone). `action` is the human's (learn) or
+    a label's.
+    """
+
+    name: CallName
+    target: int = 0
+    time_s: float = 0.0
+    argument: str = ""
+    action: Action | None = None
+    features: tuple[FeatureArray, ...] = ()
+    outcome: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class MethodCalls:
+    """The calls of a method since the last message, in order (`lira/method`): enough to go through it again."""
+
+    stamp_s: float
+    calls: tuple[MethodCall, ...]
 
 
 @dataclass(frozen=True, slots=True)

@@ -8,10 +8,14 @@ import numpy as np
 from lira.hal.messages import (
     Action,
     Call,
+    CallName,
     CourseState,
     Decision,
     ExpertView,
+    FeatureArray,
     LabelCounts,
+    MethodCall,
+    MethodCalls,
     Phase,
     SessionState,
     Stage,
@@ -90,8 +94,47 @@ def _session_from(message: Any) -> SessionState:
     return SessionState(stamp(message), Stage(message.stage), **values)
 
 
+def _calls_to(m: MethodCalls) -> Any:
+    call, array = ros("lira_msgs/msg/MethodCall"), ros("lira_msgs/msg/FeatureArray")
+    return ros("lira_msgs/msg/MethodCalls")(
+        header(m.stamp_s, ""),
+        [
+            call(
+                name=str(each.name),
+                target=each.target,
+                time_s=each.time_s,
+                argument=each.argument,
+                has_action=each.action is not None,
+                action=np.array(each.action or (math.nan, math.nan), np.float64),
+                features=[array(seen.name, np.frombuffer(seen.data, np.uint8)) for seen in each.features],
+                outcome=each.outcome,
+            )
+            for each in m.calls
+        ],
+    )
+
+
+def _calls_from(message: Any) -> MethodCalls:
+    return MethodCalls(
+        stamp(message),
+        tuple(
+            MethodCall(
+                CallName(each.name),
+                each.target,
+                each.time_s,
+                each.argument,
+                _action_from(each.action) if each.has_action else None,
+                tuple(FeatureArray(seen.name, bytes(seen.data)) for seen in each.features),
+                each.outcome,
+            )
+            for each in message.calls
+        ),
+    )
+
+
 CODECS: dict[type, Codec] = {
     CourseState: Codec("lira_msgs/msg/CourseState", _course_to, _course_from),
+    MethodCalls: Codec("lira_msgs/msg/MethodCalls", _calls_to, _calls_from),
     Decision: Codec("lira_msgs/msg/Decision", _decision_to, _decision_from),
     SessionState: Codec("lira_msgs/msg/SessionState", _session_to, _session_from),
 }

@@ -24,6 +24,7 @@ ALL_RMW = f"{SPACE}/**"
 ALL_BRIDGES = f"@/*/{SPACE}/**"
 _NODE_PARTS, _ENDPOINT_PARTS = 9, 13
 _BRIDGE_SLASH = "§"
+_BRIDGE_LATCHED = "::1:0,1"  # by DDS's numbers: transient local, keep the last 1
 
 
 class Kind(StrEnum):
@@ -87,17 +88,21 @@ class Endpoint:
 
 @dataclass(frozen=True, slots=True)
 class Route:
-    """What a bridge makes known of one topic or service: `key` is where it is on zenoh."""
+    """What a bridge makes known of one topic or service: `key` is where it is on zenoh.
+
+    What is `latched` has to say so: the other end's writer would not serve readers that want the last value.
+    """
 
     bridge: str
     kind: Kind
     key: str
     ros_type: str
+    latched: bool = False
 
     @property
     def token(self) -> str:
-        """Key of its token; the bridge's own quality of service is left to the other end's defaults."""
-        qos = [":::"] if self.kind in (Kind.PUBLISHER, Kind.SUBSCRIPTION) else []
+        """Key of its token; other quality of service is left to the other end's defaults."""
+        qos = [_BRIDGE_LATCHED if self.latched else ":::"] if self.kind in (Kind.PUBLISHER, Kind.SUBSCRIPTION) else []
         parts = self.key.replace("/", _BRIDGE_SLASH), self.ros_type.replace("/", _BRIDGE_SLASH)
         return "/".join(["@", self.bridge, SPACE, self.kind, *parts, *qos])
 

@@ -2,12 +2,15 @@
 
 from collections import OrderedDict
 from collections.abc import Hashable
+from typing import Any
 
 from lira.hal.bus.attachment import Attachment
 from lira.hal.bus.bus import Bus
 from lira.hal.bus.reader import Received
 from lira.hal.bus.topics import CMD_VEL, ESTOP, TELEOP, Topic, named
-from lira.hal.messages import Command, Source, Twist, is_neutral
+from lira.hal.messages import Command, Source, Twist, TwistStamped, is_neutral
+from lira.hal.profile import Control
+from lira.hal.server.command_watch import CommandWatch, Noted
 
 EPOCHS = 1 << 64
 DEPTH = 32  # a neutral command must not be lost under the motion that follows it
@@ -32,11 +35,12 @@ class Order:
 
 
 class Inlet:
-    """Reads the command topics."""
+    """Reads the command topics. `watch` gets to know who commands."""
 
-    def __init__(self, bus: Bus) -> None:
-        self._policy = _Commands(bus, CMD_VEL, Source.POLICY)
-        self._teleop = _Commands(bus, TELEOP, Source.TELEOP)
+    def __init__(self, bus: Bus, control: Control, watch: CommandWatch | None = None) -> None:
+        watch = watch or CommandWatch()
+        self._policy = _Commands(bus, CMD_VEL, Source.POLICY, watch, control.policy_timeout_s)
+        self._teleop = _Commands(bus, TELEOP, Source.TELEOP, watch, control.teleop_timeout_s)
         self._estop = bus.reader(ESTOP, ESTOP_DEPTH)
         self._seen = Order()
 
@@ -64,27 +68,29 @@ class Inlet:
 class _Commands:
     """One of the command topics."""
 
-    def __init__(self, bus: Bus, topic: Topic[Twist], source: Source) -> None:
+    def __init__(self, bus: Bus, topic: Topic[Twist], source: Source, watch: CommandWatch, timeout_s: float) -> None:
         # The plain topic, on which ROS bridges command too, and with keys those that carry a name.
-        topics = [topic, named(topic, "*")] if bus.encrypted else [topic]
+        topics: list[Topic[Any]] = [topic, named(topic, "*")] if bus.encrypted else [topic]
         self._readers = [bus.reader(each, DEPTH) for each in topics]
         self._boundary = bus.boundary
         self._key = topic.key
         self._source = source
+        self._watch = watch
+        self._timeout_s = timeout_s
         self._order = Order()
 
     def take(self, now_s: float) -> list[Command]:
         """Return what came since the last time, oldest first."""
-        came = [received for reader in self._readers for received in reader.poll()]
-        bare = sum(received.attachment is None for received in came)
+        came: list[Received[Twist | TwistStamped]] = [each for reader in self._readers for each in reader.poll()]
+        bare = sum(_is_bare(received) for received in came)
         if bare >= BURST:
             # These are judged by when they come, and what a link has held back for seconds comes all at once.
             self._boundary.refuse(self._key, "burst", bare)
-            came = [received for received in came if received.attachment is not None]
+            came = [received for received in came if not _is_bare(received)]
         commands = [self._command(received, now_s) for received in came if self._has_sender(received)]
         return [command for command in commands if self._is_new(command)]
 
-    def _has_sender(self, received: Received[Twist]) -> bool:
+    def _has_sender(self, received: Received[Twist | TwistStamped]) -> bool:
         """Whether there is anything to tell whose it is."""
         if received.attachment is None and not received.sender:
             self._boundary.refuse(self._key, "no sender")
@@ -98,13 +104,32 @@ class _Commands:
         self._boundary.refuse(self._key, "out of order")
         return False
 
-    def _command(self, received: Received[Twist], now_s: float) -> Command:
-        """Its time is the sender's. A sample without our attachment (a ROS peer's) is judged by its arrival, and its
-        hand lets go with a zero: it cannot say so in another way. Such peers are told apart by the id of their session.
+    def _command(self, received: Received[Twist | TwistStamped], now_s: float) -> Command:
+        """Its time is the sender's. A sample without our attachment (a ROS peer's) is judged by its stamp, and one
+        without that by its arrival. Its hand lets go with a zero: it cannot say so in another way. Such peers are told
+        apart by the id of their session.
         """
-        twist, sent, commander = received.message, received.attachment, received.commander
+        message, sent, commander = received.message, received.attachment, received.commander
+        twist = message.twist if isinstance(message, TwistStamped) else message
+        self._watch.note_sender(received.sender, received.arrived_s)
         if sent is None:
+            stamp_s = _stamp(received)
+            age_s = None if stamp_s is None else now_s - stamp_s
+            noted = Noted(received.arrived_s, age_s, not is_neutral(twist))
+            self._watch.note_ros(self._key, received.sender, self._timeout_s, noted)
             released = self._source is Source.TELEOP and is_neutral(twist)
             epoch = int(received.sender, 16) % EPOCHS
-            return Command(twist, now_s, self._source, released=released, epoch=epoch, commander=commander)
+            told_s = now_s if stamp_s is None else stamp_s
+            return Command(twist, told_s, self._source, released=released, epoch=epoch, commander=commander)
         return Command(twist, sent.time_s, self._source, sent.answers, sent.released, sent.epoch, sent.seq, commander)
+
+
+def _stamp(received: Received[Twist | TwistStamped]) -> float | None:
+    """When a ROS peer says that it decided; None for one that does not. A stamp of 0 is ROS's word for none."""
+    message = received.message
+    return message.stamp_s if isinstance(message, TwistStamped) and message.stamp_s != 0.0 else None
+
+
+def _is_bare(received: Received[Twist | TwistStamped]) -> bool:
+    """Whether nothing but its arrival tells when it was said."""
+    return received.attachment is None and _stamp(received) is None

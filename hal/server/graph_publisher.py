@@ -4,7 +4,23 @@ from typing import Any
 
 from lira.hal.bus.bus import Bus
 from lira.hal.bus.publisher import Publisher
-from lira.hal.bus.topics import CAMERA_INFO, DEPTH_INFO, DESCRIPTION, TF, TF_STATIC, Topic
+from lira.hal.bus.sensors import sensors_of
+from lira.hal.bus.topics import (
+    APPLIED,
+    CAMERA_INFO,
+    DEPTH_INFO,
+    DESCRIPTION,
+    DIAGNOSTICS,
+    ESTOP_LOOK,
+    ESTOP_PRESS,
+    ESTOP_RELEASE,
+    INFO,
+    RESET,
+    SIM_STATE,
+    TF,
+    TF_STATIC,
+    Topic,
+)
 from lira.hal.description.camera_info import info_for, pinhole
 from lira.hal.description.frames import odometry_transform, static_transforms
 from lira.hal.description.urdf import urdf_of
@@ -20,12 +36,26 @@ class GraphPublisher:
     """Describes one robot. `calibration` is what its camera really projects, None for the profile's pinhole."""
 
     def __init__(self, bus: Bus, profile: RobotProfile, calibration: CameraInfo | None = None) -> None:
+        self._bus = bus
         self._boundary = bus.boundary
         self._profile = profile
         self._calibration = calibration
         self._shown_s: dict[str, float] = {}  # of which picture it was told what it shows, by sensor
         topics: tuple[Topic[Any], ...] = (TF, TF_STATIC, DESCRIPTION, *INFOS.values())
         self._publishers: dict[str, Publisher[Any]] = {topic.key: bus.publisher(topic) for topic in topics}
+
+    def announce(self, *, arena: bool) -> None:
+        """Make known to bridges to ROS 2 what the robot says and answers; what it is told it hears unannounced.
+
+        A bridge would else make an announced command's type the only one that it passes on.
+        """
+        said: list[Topic[Any]] = [TF, TF_STATIC, DESCRIPTION, APPLIED, DIAGNOSTICS, *([SIM_STATE] if arena else [])]
+        for sensor in sensors_of(self._profile):
+            said += [sensor.topic, *([INFOS[sensor.name]] if sensor.name in INFOS else [])]
+        for topic in said:
+            self._bus.announce(topic)
+        for key in (INFO, ESTOP_PRESS, ESTOP_RELEASE, ESTOP_LOOK, *([RESET] if arena else [])):
+            self._bus.announce_service(key)
 
     def describe(self, now_s: float) -> None:
         """Publish what stays as it is, for all who ever come."""

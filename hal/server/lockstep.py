@@ -40,7 +40,7 @@ class LockstepLoop:
         self._info_service = info_service
         self._arena = arena
         self._boundary = bus.boundary
-        self._inlet = Inlet(bus)
+        self._inlet = Inlet(bus, robot.profile.control)
         self._estop = EstopService(robot, bus)
         self._sensors = sensors
         self._applied = bus.publisher(APPLIED, IN_LOCKSTEP)

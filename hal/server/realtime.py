@@ -17,6 +17,7 @@ from lira.hal.messages import Applied, Observation, Reason
 from lira.hal.port import Arena
 from lira.hal.safety.governed import GovernedRobot
 from lira.hal.server.command_reader import Inlet
+from lira.hal.server.command_watch import CommandWatch
 from lira.hal.server.info_service import InfoService
 from lira.hal.server.sensor_publisher import SensorPublisher
 
@@ -34,13 +35,19 @@ class CommandLoop:
     """Moves the wheels: law 1 stands on this page. Nothing here waits for the bus: `events` tells what was applied.
 
     `alive` is called with every look of the watchdog: whoever supervises the process hears by it that the loop turns.
+    `watch` gets to know who commands.
     """
 
     def __init__(
-        self, robot: GovernedRobot, bus: Bus, events: "AppliedLoop", alive: Callable[[], None] = lambda: None
+        self,
+        robot: GovernedRobot,
+        bus: Bus,
+        events: "AppliedLoop",
+        watch: CommandWatch,
+        alive: Callable[[], None] = lambda: None,
     ) -> None:
         self._robot = robot
-        self._inlet = Inlet(bus)
+        self._inlet = Inlet(bus, robot.profile.control, watch)
         self._boundary = bus.boundary
         self._events = events
         self._alive = alive

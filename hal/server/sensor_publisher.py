@@ -32,8 +32,9 @@ class SensorPublisher:
         self._drift = Drift(profile.base)
         self._publishers: dict[str, Publisher[Any]] = {each.name: bus.publisher(each.topic, qos) for each in SENSORS}
 
-    def describe(self, now_s: float) -> None:
-        """Publish how the robot is built, for all who ever come."""
+    def describe(self, now_s: float, *, arena: bool) -> None:
+        """Publish how the robot is built, for all who ever come, and make known what there is, of an `arena`, too."""
+        self._graph.announce(arena=arena)
         self._graph.describe(now_s)
 
     def put(self, observation: Observation, now_s: float) -> None:

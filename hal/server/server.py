@@ -16,6 +16,7 @@ from lira.hal.errors import BusError
 from lira.hal.messages import CameraInfo
 from lira.hal.port import Arena
 from lira.hal.safety.governed import GovernedRobot
+from lira.hal.server.command_watch import CommandWatch
 from lira.hal.server.diagnostics import Reporter
 from lira.hal.server.estop_service import EstopService
 from lira.hal.server.info_service import InfoService
@@ -83,7 +84,7 @@ class HalServer:
         try:
             sensors = SensorPublisher(self._bus, self._robot.profile, self._calibration, lockstep=True)
             loop = LockstepLoop(self._robot, self._bus, sensors, self._info_service(), self._arena)
-            sensors.describe(self._robot.now())
+            sensors.describe(self._robot.now(), arena=self._arena is not None)
             self._ready()
             loop.run(stop)
         finally:
@@ -101,7 +102,7 @@ class HalServer:
             self._robot.open()
             try:
                 self._bus.count_from_1970(self._robot.now)
-                publisher.describe(self._robot.now())
+                publisher.describe(self._robot.now(), arena=self._arena is not None)
                 loop = SensorLoop(self._robot, self._bus, publisher, pictures, self._info_service(), self._arena)
                 opened.set()
                 loop.run(wheels_still)
@@ -112,13 +113,14 @@ class HalServer:
         while not opened.wait(LOOK_S) and not stop.is_set():
             pass
         applied = AppliedLoop(self._robot, self._bus)
-        commands = CommandLoop(self._robot, self._bus, applied, self._alive)
+        watch = CommandWatch()
+        commands = CommandLoop(self._robot, self._bus, applied, watch, self._alive)
         wheels = crew.start("commands", lambda: commands.run(stop))
         crew.start("applied", lambda: applied.run(stop))
         crew.start("pictures", lambda: pictures.run(stop))
         estop = EstopService(self._robot, self._bus)
         crew.start("estop", lambda: estop.run(stop))
-        reporter = Reporter(self._robot, self._bus)
+        reporter = Reporter(self._robot, self._bus, watch)
         crew.start("diagnostics", lambda: reporter.run(stop))
         try:
             if opened.is_set():

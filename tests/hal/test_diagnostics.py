@@ -69,6 +69,7 @@ def test_it_says_that_datagrams_do_not_get_through_and_still_drives(capfd):
             client = RemoteRobot(bus)
             client.open()
             reader = bus.reader(DIAGNOSTICS)
+            wait_for(lambda: client.drive(Command(STOP, client.now())).reason == "ok")
             wait_for(lambda: (link := status(reader, "link")) is not None and link.level == WARN, 10.0)
             assert status(reader, "link").message == NO_DATAGRAMS
             wait_for(lambda: client.drive(Command(STOP, client.now())).reason == "ok")

@@ -6,7 +6,7 @@ from types import SimpleNamespace
 
 import pytest
 import zenoh
-from wiring import joined, new_endpoint, new_name, real_time_null, remote, served, wait_for
+from wiring import PROFILE, joined, new_endpoint, new_name, real_time_null, remote, served, wait_for
 
 from lira.hal.bus.attachment import Attachment
 from lira.hal.bus.boundary import Boundary
@@ -63,7 +63,7 @@ def ready(client, *readers):
 
 def test_a_repeated_command_renews_nothing(pair):
     robot, client = pair
-    inlet = Inlet(robot)
+    inlet = Inlet(robot, PROFILE.control)
     ready(client)
     sent = Attachment(9, 4, 10**9).to_bytes()
     for _ in range(3):
@@ -75,7 +75,7 @@ def test_a_repeated_command_renews_nothing(pair):
 
 def test_what_a_link_held_back_of_a_ros_peer_does_not_count_as_said_now(pair):
     robot, client = pair
-    inlet = Inlet(robot)
+    inlet = Inlet(robot, PROFILE.control)
     ready(client)
     for _ in range(BURST):
         put(client, CMD_VEL, encode(GO))
@@ -88,7 +88,7 @@ def test_what_a_link_held_back_of_a_ros_peer_does_not_count_as_said_now(pair):
 
 def test_a_poll_ends_however_much_there_is(pair):
     robot, client = pair
-    inlet, reader = Inlet(robot), robot.reader(CMD_VEL, DEPTH)
+    inlet, reader = Inlet(robot, PROFILE.control), robot.reader(CMD_VEL, DEPTH)
     ready(client)
     for seq in range(3 * DEPTH):
         put(client, CMD_VEL, encode(GO), Attachment(9, seq, 0).to_bytes())
@@ -131,7 +131,7 @@ def test_a_poll_ends_although_there_is_always_more(payload):
 
 def test_a_press_among_ever_so_many_idle_messages_is_not_lost(pair):
     robot, client = pair
-    inlet = Inlet(robot)
+    inlet = Inlet(robot, PROFILE.control)
     ready(client)
     put(client, ESTOP, encode(Bool(False)))
     time.sleep(0.2)
@@ -145,7 +145,7 @@ def test_a_press_among_ever_so_many_idle_messages_is_not_lost(pair):
 
 def test_a_press_that_is_shown_again_presses_once_whatever_came_between(pair):
     robot, client = pair
-    inlet = Inlet(robot)
+    inlet = Inlet(robot, PROFILE.control)
     ready(client)
     press = Attachment(9, 1, 0).to_bytes()
     put(client, ESTOP, encode(Bool(True)), press)

@@ -12,7 +12,7 @@ from lira.hal.messages import STOP, Command, Reason, Twist
 
 PRODUCT = Path(__file__).parent.parent.parent
 FOLDERS = [PRODUCT / name for name in ("hal", "robot", "fusion", "sim_backend", "tools")]
-MOST_FILES = 27
+MOST_FILES = 28
 # What reads and publishes the scan, and what judges and applies the command; the driver is the test itself.
 ON_THE_WAY = ("hal-sensors", "hal-commands")
 

@@ -10,9 +10,9 @@ from lira.hal.bus.bus import Bus
 from lira.hal.bus.topics import APPLIED, BATTERY, CAMERA, ODOM, SCAN
 from lira.tools.cli import main
 from lira.tools.launch.processes import ChildProcess, free_port, lira_command
+from lira.tools.recording.beside import READY
 from lira.tools.recording.reader import Recording
 from lira.tools.recording.summary import summarise
-from lira.tools.verbs.records.record import READY
 
 READY_S = 60.0
 LAST_SECOND_S = 1.0

@@ -11,8 +11,8 @@ import threading
 import time
 from pathlib import Path
 
-from lira.tools.joystick.codes import AXES, BUTTONS, EV_ABS, EV_KEY
-from lira.tools.joystick.mapping import load_mapping
+from lira.tools.joystick.pads.codes import AXES, BUTTONS, EV_ABS, EV_KEY
+from lira.tools.joystick.pads.mapping import load_mapping
 
 PS3 = load_mapping("ps3")
 PAD_KEYS = sorted(BUTTONS[name] for name in PS3.buttons)

@@ -6,7 +6,7 @@ from lira.hal.errors import ConfigError
 from lira.hal.messages import JoyFeedback
 from lira.tools.joystick.axes import AxisRange, PadState, action_of, shape
 from lira.tools.joystick.freeze import GAPS, LONGEST_S, SHORTEST_S, FreezeWatch
-from lira.tools.joystick.mapping import Mapping, known_pads, load_mapping
+from lira.tools.joystick.pads.mapping import Mapping, known_pads, load_mapping
 from lira.tools.joystick.rumble import ATTENTION, ATTENTION_ID, FEEDBACK, FEEDBACK_ID, Rumble, pattern_of
 
 PS3 = load_mapping("ps3")

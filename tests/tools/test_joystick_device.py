@@ -7,12 +7,12 @@ import pytest
 
 from lira.hal.errors import DeviceError
 from lira.tools.joystick.axes import AxisRange, PadEvent, PadState
-from lira.tools.joystick.event_device import EVENT, EventDevice
-from lira.tools.joystick.finder import choose
-from lira.tools.joystick.mapping import load_mapping
-from lira.tools.joystick.nodes import Node, is_any_pad, motion_of, parse_bitmap, read_nodes
+from lira.tools.joystick.device.event_device import EVENT, EventDevice
+from lira.tools.joystick.device.finder import choose
+from lira.tools.joystick.device.rumble_motor import Motor
 from lira.tools.joystick.pad_detect import moved_axis, pressed_button
-from lira.tools.joystick.rumble_motor import Motor
+from lira.tools.joystick.pads.mapping import load_mapping
+from lira.tools.joystick.pads.nodes import Node, is_any_pad, motion_of, parse_bitmap, read_nodes
 
 PS3 = load_mapping("ps3")
 KEYS = frozenset({*range(304, 319), *range(544, 548)} - {306, 309})
@@ -158,7 +158,7 @@ def test_a_missing_package_is_named_before_a_robot_is_looked_for(verb, package, 
 
 def test_the_bridge_needs_no_package():
     code = "import sys; sys.modules.update(pygame=None, evdev=None); "
-    code += "from lira.tools.joystick import bridge, client, pad, pad_wizard"
+    code += "from lira.tools.joystick import bridge, client, pad_wizard\nfrom lira.tools.joystick.device import pad"
     assert subprocess.run([sys.executable, "-c", code], check=False, timeout=60).returncode == 0
 
 
@@ -212,7 +212,7 @@ def test_a_rumble_is_what_the_kernel_takes(tmp_path, monkeypatch):
             effect.id = 7
         return 0
 
-    monkeypatch.setattr("lira.tools.joystick.event_device.fcntl.ioctl", ioctl)
+    monkeypatch.setattr("lira.tools.joystick.device.event_device.fcntl.ioctl", ioctl)
     path = tmp_path / "event5"
     path.touch()
     device = EventDevice(str(path))
@@ -237,7 +237,7 @@ def test_a_device_that_may_only_be_read_is_opened_for_reading(tmp_path, monkeypa
             raise PermissionError(13, "Permission denied")
         return real(name, flags, *more)
 
-    monkeypatch.setattr("lira.tools.joystick.event_device.os.open", refuse_writing)
+    monkeypatch.setattr("lira.tools.joystick.device.event_device.os.open", refuse_writing)
     device = EventDevice(str(path))
     assert device.read() == [PadEvent(3, 1, 200)]
     with pytest.raises(EOFError):

@@ -7,11 +7,11 @@ import pytest
 
 from lira.tools.cli import main
 from lira.tools.joystick.axes import AxisRange, PadState
-from lira.tools.joystick.codes import AXES, BUTTONS
-from lira.tools.joystick.families import FAMILIES, layout_of, missing, why_not
-from lira.tools.joystick.mapping import known_pads, load_mapping
-from lira.tools.joystick.nodes import Node, is_any_pad
-from lira.tools.joystick.rules import rules_text
+from lira.tools.joystick.device.rules import rules_text
+from lira.tools.joystick.pads.codes import AXES, BUTTONS
+from lira.tools.joystick.pads.families import FAMILIES, layout_of, missing, why_not
+from lira.tools.joystick.pads.mapping import known_pads, load_mapping
+from lira.tools.joystick.pads.nodes import Node, is_any_pad
 
 HAT = {16, 17}
 PLACED = {304, 305, 307, 308, 310, 311, 314, 315, 316, 317, 318}

@@ -3,9 +3,9 @@ import itertools
 import pytest
 
 from lira.tools.joystick.axes import AxisRange, PadEvent, PadState
-from lira.tools.joystick.codes import AXES, BUTTONS, EV_ABS, EV_KEY
 from lira.tools.joystick.deadman import RELEASE_S, TRANSITIONS, ZERO, ZEROS_S, Event, Hand, Order, State
-from lira.tools.joystick.mapping import load_mapping
+from lira.tools.joystick.pads.codes import AXES, BUTTONS, EV_ABS, EV_KEY
+from lira.tools.joystick.pads.mapping import load_mapping
 
 PS3 = load_mapping("ps3")
 RANGES = dict.fromkeys(range(6), AxisRange(0, 255))

@@ -7,10 +7,10 @@ import pytest
 from lira.hal.messages import OperatorRequest, Request
 from lira.tools.console.keyboard import pad_of
 from lira.tools.joystick.axes import PadState
-from lira.tools.joystick.codes import BUTTONS
 from lira.tools.joystick.freeze import GAPS, FreezeWatch
 from lira.tools.joystick.known_pads import PadMemory, state_file
-from lira.tools.joystick.mapping import load_mapping
+from lira.tools.joystick.pads.codes import BUTTONS
+from lira.tools.joystick.pads.mapping import load_mapping
 from lira.tools.joystick.requests import HOLD_S, RequestButtons
 
 PS3 = load_mapping("ps3")

@@ -322,6 +322,7 @@ def test_learn_asks_and_writes_a_file_that_loads(bed, start, tmp_path):
         ("FORWARD", "ABS_Y", 0, 128), ("LEFT", "ABS_RX", 0, 128), ("DEAD-MAN", "BTN_TR", 1, 0),
         ("TURBO", "BTN_TL", 1, 0), ("EMERGENCY STOP", "BTN_EAST", 1, 0), ("RELEASES", "BTN_NORTH", 1, 0),
         ("PAUSES", "BTN_WEST", 1, 0), ("SAVES", "BTN_SELECT", 1, 0), ("EPISODE", "BTN_START", 1, 0),
+        ("PROOF", "BTN_SOUTH", 1, 0), ("UNDOES", "BTN_THUMBL", 1, 0),
         ("EXPERT 1", "ABS_HAT0Y", -1, 0), ("EXPERT 2", "ABS_Z", 255, 0), ("EXPERT 3", "ABS_HAT0Y", 1, 0),
     ):  # fmt: skip
         rig.says(f"{words}")
@@ -331,15 +332,15 @@ def test_learn_asks_and_writes_a_file_that_loads(bed, start, tmp_path):
         rig.says(f"... {name}", 2 if words == "EXPERT 3" else 1)
         send(PAD, name, rest)
     assert rig.process.wait(30.0) == 0  # the fourth expert goes unanswered
-    from lira.tools.joystick.mapping import load_mapping
+    from lira.tools.joystick.pads.mapping import load_mapping
 
     mapping = load_mapping(str(path))
     assert (mapping.forward.axis, mapping.forward.inverted, mapping.turn.axis) == ("ABS_Y", True, "ABS_RX")
     assert (mapping.dead_man, mapping.turbo, mapping.estop, mapping.release) == (
         "BTN_TR", "BTN_TL", ("BTN_EAST",), "BTN_NORTH",
     )  # fmt: skip
-    assert (mapping.pause, mapping.save, mapping.reset, mapping.experts) == (
-        "BTN_WEST", "BTN_SELECT", "BTN_START", ("ABS_HAT0Y-", "ABS_Z+", "ABS_HAT0Y+"),
+    assert (mapping.pause, mapping.save, mapping.reset, mapping.prove, mapping.undo, mapping.experts) == (
+        "BTN_WEST", "BTN_SELECT", "BTN_START", "BTN_SOUTH", "BTN_THUMBL", ("ABS_HAT0Y-", "ABS_Z+", "ABS_HAT0Y+"),
     )  # fmt: skip
 
 

@@ -1,6 +1,7 @@
 """A person's session: what its buttons ask at each stage, how laps end, what is told, and all of it on a twin."""
 
 import dataclasses
+import time
 
 import pytest
 from msgspec import structs
@@ -8,28 +9,47 @@ from msgspec import structs
 from lira.fusion.control import ControlLoop
 from lira.fusion.experts.tasks import TASKS
 from lira.fusion.learning.trainer import InlineTrainer
-from lira.fusion.log.counts import Ledger
+from lira.fusion.log.counts import Account, Ledger
 from lira.fusion.log.label_log import read_demonstrations
 from lira.fusion.log.recorder import Journal
-from lira.fusion.log.run_log import LapRecord, RunWriter
+from lira.fusion.log.run_log import LapRecord, ResultRecord, RunWriter, StepRecord
+from lira.fusion.methods.base import Alone, Method
 from lira.fusion.methods.presets import METHODS
 from lira.fusion.teaching.session import Tally
 from lira.fusion.teaching.teacher import SKILLED
 from lira.hal.errors import ConfigError
-from lira.hal.messages import Applied, CourseState, LabelCounts, OperatorRequest, Phase, Request, Source, Stage
+from lira.hal.messages import (
+    Applied,
+    Call,
+    CourseState,
+    Decision,
+    Driver,
+    LabelCounts,
+    OperatorRequest,
+    Phase,
+    Request,
+    Source,
+    Stage,
+)
 from lira.hal.profile import load_profile
 from lira.sim_backend.catalogue import load_world
+from lira.tools.live.before import Before, sum_up
 from lira.tools.live.board import Board
 from lira.tools.live.classroom import Classroom
+from lira.tools.live.exam import Exam
 from lira.tools.live.lap import Fate, fate
+from lira.tools.live.lap_driver import LapDriver
+from lira.tools.live.lessons import Lessons
 from lira.tools.live.requests import reply
-from lira.tools.live.session import LiveSession, Rules
+from lira.tools.live.rules import Rules
+from lira.tools.live.session import LiveSession
 from lira.tools.live.verdict import has_passed, judged_words, verdict_words
 from lira.tools.runs.build import teacher
 from lira.tools.runs.course import Course
+from lira.tools.runs.plan import Plan
 from lira.tools.runs.simulated import simulate
-from lira.tools.runs.teach import Plan
 
+RESULT = ResultRecord(False, 1, 0, 0, 0, 0, 0, 0, 1.0, 1.0)
 PASSED = LapRecord(Phase.PROVE, 1, 0, True, True, 80.0, 0, 0, 0.1, 10, 2, 3, 20, 5, 1.0)
 TRUTH = CourseState(1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 3.0, 0.1, 1.0)
 
@@ -112,6 +132,52 @@ def test_a_lap_goes_on_is_put_back_or_is_over(state, phase, words, expected):
     assert tally.passed == (expected is Fate.GOES_ON or state.finished)
 
 
+# Which layouts
+
+
+def test_a_session_teaches_its_own_layout_until_the_novice_was_examined():
+    lessons = Lessons(5)
+    lessons.note_lap(lap(Phase.TRAIN, layout=5))
+    assert lessons.layout == 5
+    assert list(lessons.draw(3)) == [6, 7, 8]
+    assert list(lessons.draw(2)) == [9, 10]  # nobody is examined on the same layout twice
+
+
+def test_what_the_novice_failed_is_taught_until_it_was_passed_and_then_something_new():
+    lessons = Lessons(0)
+    failed = [lap(Phase.UNSEEN, layout=number, passed=number not in (2, 4)) for number in lessons.draw(4)]
+    lessons.note_proof([lap(Phase.PROVE), *failed])
+    assert lessons.layout == 2
+    lessons.note_lap(lap(Phase.TRAIN, layout=2, passed=False))
+    assert lessons.layout == 2
+    lessons.note_lap(lap(Phase.TRAIN, layout=2))
+    assert lessons.layout == 4
+    lessons.note_lap(lap(Phase.TRAIN, layout=4))
+    assert lessons.layout == 5
+    assert list(lessons.draw(2)) == [6, 7]
+
+
+def test_who_fails_where_it_was_taught_is_taught_there_again():
+    lessons = Lessons(0)
+    lessons.note_proof([lap(Phase.PROVE, passed=False)])
+    lessons.note_lap(lap(Phase.TRAIN))
+    assert lessons.layout == 0
+
+
+def test_what_was_seen_on_other_days_is_not_unseen():
+    assert list(Lessons(0, {0, 3, 12}).draw(2)) == [13, 14]
+    assert list(Lessons(20, {0, 3}).draw(2)) == [21, 22]
+
+
+def test_time_is_up_for_teaching_and_not_for_a_proof_that_was_begun():
+    rules = Rules(minutes=2.0)
+    assert [stage for stage in Stage if rules.is_late(stage, 121.0)] == [
+        *(Stage.DEMONSTRATION, Stage.TEACHING, Stage.VERDICT, Stage.OVER)
+    ]
+    assert not any(rules.is_late(stage, 119.0) for stage in Stage)
+    assert not any(Rules().is_late(stage, 1e6) for stage in Stage)
+
+
 # What it comes to
 
 
@@ -134,18 +200,51 @@ def test_who_fails_where_it_was_taught_has_not_passed_and_the_verdict_says_why()
 
 def test_the_board_counts_laps_and_tells_a_new_stage_at_once():
     told, said = [], []
-    board = Board("ada", Ledger(), lambda: 1.0, told.append, said.append)
+    board = Board("ada", Before(), Ledger(), lambda: 1.0, told.append, said.append)
     assert board.begin_lap() == 1
     board.show(Stage.TEACHING, 3)
     board.show(Stage.TEACHING, 3)  # too soon to be told again
     board.end_lap(Tally(steps=10, human_steps=4), lap(Phase.TRAIN, collisions=2))
-    board.note_proof([lap(Phase.PROVE), lap(Phase.UNSEEN, passed=False)], "words")
+    board.note_proof([lap(Phase.PROVE), lap(Phase.UNSEEN, passed=False)])
+    board.note_verdict("words", converged=True)
     board.show(Stage.VERDICT, 4)
     assert [(state.stage, state.layout) for state in told] == [(Stage.TEACHING, 3), (Stage.VERDICT, 4)]
     last = told[-1]
     assert (last.person, last.laps, last.passed, last.collisions, last.words) == ("ada", 1, 1, 2, "words")
-    assert (last.curve, last.proven, last.shown) == ((pytest.approx(0.6),), 1, 2)
+    assert (last.curve, last.proven, last.shown, last.converged) == ((pytest.approx(0.6),), 1, 2, True)
+    board.begin_lap()
+    assert (board.state.shown, board.state.converged) == (0, False)  # it goes on being taught
     assert "60% driven without you" in said[0]
+
+
+def decided(number, *, phase=Phase.TRAIN, driver=Driver.NOVICE, layout=0):
+    said = (number, driver, Call.NONE, (1.0, 0.0), (1.0, 0.0), None, (), 0.06)
+    decision = Decision(1.0, *said, LabelCounts(), 3, 2, 1, phase, number)
+    return StepRecord(decision, layout=layout)
+
+
+def test_the_days_before_are_summed_up_by_lap():
+    head = Plan(METHODS["plus"]).head(load_profile("thesis-sim"), "line")
+    account = Account(steps=8, human_steps=3)
+    records = [
+        head,
+        *[decided(1), decided(1, driver=Driver.HUMAN)],
+        lap(Phase.TRAIN, lap=1, collisions=2, passed=False),
+        decided(1, phase=Phase.UNSEEN, layout=7),
+        lap(Phase.UNSEEN, lost=1),
+        structs.replace(RESULT, account=account),
+        head,
+        *[decided(2)] * 4,
+        lap(Phase.TRAIN, lap=2, lost=1),
+        decided(3),  # cut off
+    ]
+    before = sum_up(records, head)
+    assert (before.laps, before.passed, before.collisions, before.lost) == (3, 1, 2, 1)
+    assert (before.curve, before.layouts, before.account) == ((0.5, 1.0), {0, 7}, account)
+    assert before.newest == decided(3).decision
+    assert sum_up([], head) == Before()
+    board = Board("ada", before, Ledger(), lambda: 1.0, [].append, [].append)
+    assert (board.begin_lap(), board.state.passed, board.state.curve) == (4, 1, (0.5, 1.0))
 
 
 def test_counts_go_on_from_another_day_and_labels_are_taken_back():
@@ -153,8 +252,57 @@ def test_counts_go_on_from_another_day_and_labels_are_taken_back():
     before = LabelCounts(given_human=5, given_expert=9, stored_human=4, stored_expert=7, demonstration=3)
     ledger.go_on(before, interventions=2, calls=6)
     assert (ledger.labels, ledger.interventions, ledger.calls) == (before, 2, 6)
+    account = Account(steps=100, human_steps=30, answered=4)
+    again = Ledger()
+    again.go_on(before, 2, 6, account)
+    assert (again.account.steps, again.account.human_steps, again.account.answered) == (100, 30, 4)
     ledger.take_back("human", 5)
     assert (ledger.labels.stored_human, ledger.labels.demonstration) == (0, 2)
+
+
+# The exam
+
+
+class Learner(Method):
+    """One that drives straight on."""
+
+    def propose(self, features):
+        raise AssertionError("it is not taught here")
+
+    def alone(self, phase):
+        assert phase is Phase.UNSEEN
+        return Alone("novice", lambda _: (1.0, 0.0))
+
+
+def short(name="line", finish_m=12.0):
+    """A world whose laps are short."""
+    place = load_world(name)
+    limits, line = structs.replace(place.limits, finish_m=finish_m), structs.replace(place.line, closed=False)
+    return structs.replace(place, limits=limits, line=line)
+
+
+def examined(journal, count, *, enough=False):
+    profile, place = load_profile("thesis-sim"), short(finish_m=2.0)
+    drives = [Course(profile, place).lap(layout) for layout in range(3, 3 + count)]
+    with Exam(profile, place, Learner(), drives, journal) as exam:
+        while exam.goes_on and not enough:
+            time.sleep(0.01)
+    return exam.laps
+
+
+def test_an_exam_shows_every_layout_and_is_written_down_but_not_published():
+    written, published = [], []
+    journal = Journal(write=written.append, publish=published.append)
+    laps = examined(journal, 3)
+    assert [(each.phase, each.lap, each.layout) for each in laps] == [(Phase.UNSEEN, k + 1, 3 + k) for k in range(3)]
+    assert [record for record in written if isinstance(record, LapRecord)] == list(laps)
+    assert sum(isinstance(record, StepRecord) for record in written) > 10
+    assert published == []
+    assert journal.ledger.account.steps == 0
+
+
+def test_an_exam_ends_early_if_nobody_waits_for_it():
+    assert len(examined(Journal(), 500, enough=True)) < 500
 
 
 # A whole session, in this process
@@ -196,9 +344,7 @@ class NoService:
 
 def hold(folder, *, script, laps=3, world="line", unseen=1, practice_s=0.0):
     """A session on a twin in this process."""
-    place, profile = load_world(world), load_profile(TASKS["line"].profile)
-    limits, line = structs.replace(place.limits, finish_m=12.0), structs.replace(place.line, closed=False)
-    place = structs.replace(place, limits=limits, line=line)  # a short lap
+    place, profile = short(world), load_profile(TASKS["line"].profile)
     plan = Plan(METHODS["plus"], folder=folder, laps=laps)
     said, told, written = [], [], []
     with simulate(place, profile, renderer="sketch") as robot:
@@ -210,21 +356,16 @@ def hold(folder, *, script, laps=3, world="line", unseen=1, practice_s=0.0):
             file.write(room.head)
             journal = Journal(keep=room.keep, write=lambda record: (written.append(record), file.write(record)))
             room.go_on(journal.ledger)
-            course = Course(profile, place, unseen=range(1, 1 + unseen))
-            session = LiveSession(
-                robot,
-                robot.arena,
-                course,
-                Taught(robot, hand),
-                room,
-                journal,
-                Always(),
-                Rules(practice_s, "ada", laps),
-                said.append,
-                told.append,
+            course = Course(profile, place)
+            rules = Rules(practice_s, "ada", laps, unseen=unseen)
+            board = Board("ada", room.before, journal.ledger, robot.now, told.append, said.append)
+            reach = Taught(robot, hand)
+            driver = LapDriver(
+                *(robot, robot.arena, reach, room, journal, Always(), rules, board, said.append),
                 lambda applied: str(applied.reason),
             )
-            session.service = NoService(session, script)
+            session = LiveSession(driver, course, room, journal, rules, said.append)
+            driver.service = NoService(session, script)
             session.run()
         hand.close()
     return session, said, told, written

@@ -50,10 +50,9 @@ def on_course(**words):
     return replace(VIEW, truth=replace(TRUTH, **words), truth_age_s=0.05)
 
 
-def in_session(stage, view=VIEW, **words):
-    return replace(
-        view, session=SessionState(1.0, Stage(stage), "ada", words="It drove 2 of 3"), session_age_s=0.1, **words
-    )
+def in_session(stage, view=VIEW, *, converged=False, **words):
+    state = SessionState(1.0, Stage(stage), "ada", words="It drove 2 of 3", converged=converged)
+    return replace(view, session=state, session_age_s=0.1, **words)
 
 
 NEW = {"training_steps": 0, "labels": LabelCounts()}
@@ -74,9 +73,11 @@ CASES = [
     (in_session("practice", applied=BY_HAND), "practice"),
     (in_session("ready"), "ready"),
     (in_session("proving"), "proving"),
+    (in_session("exam"), "exam"),
     (in_session("judging"), "judging"),
     (in_session("judging", held(Reason.STALE)), "stale"),
     (in_session("verdict"), "verdict"),
+    (in_session("verdict", converged=True), "passed"),
     (replace(in_session("verdict"), session_age_s=9.0), "one_expert"),
     (in_session("teaching"), "one_expert"),
     (in_session("teaching", applied=BY_HAND), "person"),
@@ -131,7 +132,7 @@ def test_every_reason_of_the_governor_has_a_situation():
 def test_every_language_has_words_for_every_situation(language):
     words = vocabulary(language)
     assert set(words) == set(Situation)
-    known = {"expert", "age", "lost", "verdict"}
+    known = {"expert", "age", "lost", "verdict", "proven", "shown"}
     for said in words.values():
         for line in (said.who, said.why, said.now):
             assert line

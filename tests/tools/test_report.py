@@ -117,11 +117,16 @@ def test_a_run_without_ground_truth_has_no_top_view(tmp_path):
     assert "only a twin knows where the robot is" in write_report(tmp_path).read_text(encoding="utf-8")
 
 
-def test_laps_are_told_apart_and_the_last_run_of_a_file_counts(run_file):
+def test_laps_are_told_apart_and_so_are_days(run_file):
     records = list(read_run(run_file))
     laps = [record for record in records if isinstance(record, LapRecord)]
+    told = [(lap.phase, lap.lap, lap.layout) for lap in laps]
     run = digest(records + records)
-    assert [(lap.phase, lap.number, lap.layout) for lap in run.laps] == [(r.phase, r.lap, r.layout) for r in laps]
+    assert [(lap.phase, lap.number, lap.layout, lap.day) for lap in run.laps] == [
+        (*lap, day) for day in (1, 2) for lap in told
+    ]
+    run = digest(records)
+    assert [(lap.phase, lap.number, lap.layout) for lap in run.laps] == told
     assert sum(len(lap.steps) for lap in run.laps) == sum(isinstance(record, StepRecord) for record in records)
     assert run.experts == ("camera", "lidar")
 

@@ -6,7 +6,7 @@ import lira
 from lira.fusion.methods.presets import method_named
 from lira.hal.testing import NullRobot
 from lira.tools.runs.folder import snapshot
-from lira.tools.runs.teach import Plan
+from lira.tools.runs.plan import Plan
 
 PROFILE = lira.load_profile("thesis-sim")
 

@@ -2,13 +2,19 @@
 
 import dataclasses
 import itertools
+from pathlib import Path
 
 import pytest
 
+from lira.fusion.log.run_log import RunWriter, VerdictRecord
+from lira.fusion.methods.presets import METHODS
 from lira.hal.errors import ConfigError, StorageError
+from lira.hal.profile import load_profile
 from lira.tools.cli import main
+from lira.tools.runs.plan import Plan
 from lira.tools.study import script
 from lira.tools.study.analysis import paired, render
+from lira.tools.study.conduct import Study
 from lira.tools.study.order import blinded, order, square
 from lira.tools.study.plan import load_plan
 from lira.tools.study.questions import SCALES, ask_all
@@ -102,6 +108,42 @@ def test_nobody_takes_part_who_does_not_agree(tmp_path, monkeypatch, capsys):
     assert main(["study", str(path), "--participant", "1", "--to", str(tmp_path / "s")]) == 1
     assert not (tmp_path / "s").exists()
     capsys.readouterr()
+
+
+def test_a_participant_reads_no_method_and_is_asked_for_consent_once(tmp_path):
+    """The terminal, the words of a block's folder and its report: a letter, and nothing that tells which it is."""
+    path, said, taught = tmp_path / "plan.toml", [], []
+    path.write_text(PLAN + "practice_s = 5.0\nuntil_passed = false\n")
+    study = Study(load_plan(path), tmp_path / "s", said.append)
+
+    def teach(words):
+        taught.append(words)
+        head = Plan(METHODS[words[3]]).head(load_profile("thesis-sim"), "lane")
+        with RunWriter(Path(words[words.index("--run") + 1]) / "run.jsonl") as record:
+            record.write(head)
+            record.write(VerdictRecord("participant-001", "It did not", False))
+        return 1
+
+    asked = []
+
+    def ask(words):
+        asked.append(words)
+        return "yes" if "agree" in words else "50"
+
+    assert [study.hold_next(1, teach, ask) for _ in range(2)] == [0, 0]
+    with pytest.raises(ConfigError, match="every block"):
+        study.hold_next(1, teach, ask)
+    assert sum("agree" in words for words in asked) == 1
+    assert "agreed: 20" in (tmp_path / "s" / "participant-001" / "consent.txt").read_text()
+    shown = [words[words.index("--shown-as") + 1] for words in taught]
+    assert sorted(shown) == ["A", "B"]
+    assert "--whole-time" in taught[0]
+    pages = [(study.block(1, place) / "report.html").read_text() for place in (1, 2)]
+    for letter, page in zip(shown, pages, strict=True):
+        assert f"Method {letter}" in page
+    for words in [*said, *asked, *pages, *map(str, (tmp_path / "s").rglob("*"))]:
+        assert not any(name in words.lower() for name in ("plus", "dagger", "lira teach")), words
+    assert {row.method for row in read_rows(tmp_path / "s" / "blocks.csv")} == {"plus", "hg-dagger"}
 
 
 def test_a_dry_run_leaves_the_table_a_folder_for_each_and_the_page(tmp_path, monkeypatch, capsys):

@@ -31,9 +31,9 @@ from lira.tools.bench.parts import null_robot, page
 from lira.tools.joystick.axes import AxisRange, PadEvent, PadState
 from lira.tools.joystick.bridge import Bridge
 from lira.tools.joystick.client import TeleopClient
-from lira.tools.joystick.codes import AXES, BUTTONS, EV_ABS, EV_KEY, EV_SYN
 from lira.tools.joystick.known_pads import PadMemory
-from lira.tools.joystick.mapping import load_mapping
+from lira.tools.joystick.pads.codes import AXES, BUTTONS, EV_ABS, EV_KEY, EV_SYN
+from lira.tools.joystick.pads.mapping import load_mapping
 from lira.tools.launch.processes import ChildProcess, free_port
 
 SAMPLES = 150

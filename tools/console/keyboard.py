@@ -6,8 +6,8 @@ It drives the same `Hand` as a pad, so it locks, gives back and stops in the sam
 from collections.abc import Set
 
 from lira.tools.joystick.axes import PadState
-from lira.tools.joystick.codes import AXES, BUTTONS
-from lira.tools.joystick.mapping import Mapping, load_mapping
+from lira.tools.joystick.pads.codes import AXES, BUTTONS
+from lira.tools.joystick.pads.mapping import Mapping, load_mapping
 
 KEYS = {
     "space": "BTN_TL",

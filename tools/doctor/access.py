@@ -7,8 +7,8 @@ from pathlib import Path
 
 from lira.hal.bus.keys import VARIABLE, keys_from_environment
 from lira.tools.doctor.finding import Finding, Patient, fail, ok, warn
-from lira.tools.joystick.nodes import is_any_pad, motion_of, read_nodes
-from lira.tools.joystick.rules import PLACE, REMEDY
+from lira.tools.joystick.device.rules import PLACE, REMEDY
+from lira.tools.joystick.pads.nodes import is_any_pad, motion_of, read_nodes
 from lira.tools.lifecycle.ports import taken
 from lira.tools.lifecycle.setup import PORT
 

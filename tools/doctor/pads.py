@@ -7,9 +7,9 @@ from pathlib import Path
 from lira.tools.doctor.finding import Finding, Patient, fail, ok, warn
 from lira.tools.joystick.axes import PadState, unrest
 from lira.tools.joystick.bridge import layout_words
-from lira.tools.joystick.finder import Finder
-from lira.tools.joystick.pad import Pad
-from lira.tools.joystick.rules import REMEDY
+from lira.tools.joystick.device.finder import Finder
+from lira.tools.joystick.device.pad import Pad
+from lira.tools.joystick.device.rules import REMEDY
 
 LISTEN_S = 2.0
 LOW_PERCENT = 15

@@ -4,8 +4,8 @@ from dataclasses import dataclass, field, replace
 from typing import NamedTuple
 
 from lira.hal.messages import Action
-from lira.tools.joystick.codes import AXES, BUTTONS, EV_ABS, EV_KEY, HALF, axis_of
-from lira.tools.joystick.mapping import Axis, Mapping
+from lira.tools.joystick.pads.codes import AXES, BUTTONS, EV_ABS, EV_KEY, HALF, axis_of
+from lira.tools.joystick.pads.mapping import Axis, Mapping
 
 
 class PadEvent(NamedTuple):

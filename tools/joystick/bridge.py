@@ -15,7 +15,7 @@ from lira.tools.joystick.client import TeleopClient
 from lira.tools.joystick.deadman import Hand, Order, State
 from lira.tools.joystick.freeze import FreezeWatch
 from lira.tools.joystick.known_pads import PadMemory
-from lira.tools.joystick.mapping import Mapping, load_mapping
+from lira.tools.joystick.pads.mapping import Mapping, load_mapping
 from lira.tools.joystick.requests import RequestButtons
 from lira.tools.joystick.rumble import PATTERNS, TAKEN, Rumble, pattern_of
 from lira.tools.operator.situation import Urgency

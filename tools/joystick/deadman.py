@@ -15,7 +15,7 @@ from enum import StrEnum
 
 from lira.hal.messages import Action
 from lira.tools.joystick.axes import PadState, action_of
-from lira.tools.joystick.mapping import Mapping
+from lira.tools.joystick.pads.mapping import Mapping
 
 ZEROS_S = 0.5
 RELEASE_S = 1.0

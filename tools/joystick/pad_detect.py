@@ -3,8 +3,8 @@
 from dataclasses import dataclass
 
 from lira.tools.joystick.axes import PadState
-from lira.tools.joystick.codes import AXES, AXIS_NAMES, BUTTON_NAMES, BUTTONS, HALF
-from lira.tools.joystick.mapping import Axis
+from lira.tools.joystick.pads.codes import AXES, AXIS_NAMES, BUTTON_NAMES, BUTTONS, HALF
+from lira.tools.joystick.pads.mapping import Axis
 
 EXPERTS = "experts"
 MOVED = 0.7  # share of an axis's way from where it rested
@@ -30,6 +30,8 @@ ASKS = (
     Ask("pause", "press the button that PAUSES driving and learning, or wait to do without", optional=True),
     Ask("save", "press the button that SAVES what was learned, or wait to do without", optional=True),
     Ask("reset", "press the button that begins a new EPISODE when held, or wait to do without", optional=True),
+    Ask("prove", "press the button for the PROOF of a session of teaching, or wait to do without", optional=True),
+    Ask("undo", "press the button that UNDOES the last intervention when held, or wait to do without", optional=True),
     *(
         Ask(
             f"experts{number}",

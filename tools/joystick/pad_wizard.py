@@ -8,11 +8,11 @@ from pathlib import Path
 from lira.hal.config import write_whole
 from lira.hal.errors import DeviceError, StorageError
 from lira.tools.joystick.axes import PadState
-from lira.tools.joystick.finder import NONE_THERE
-from lira.tools.joystick.mapping import Axis, load_mapping
-from lira.tools.joystick.nodes import Node, is_any_pad, motion_of, read_nodes
-from lira.tools.joystick.pad import Pad
+from lira.tools.joystick.device.finder import NONE_THERE
+from lira.tools.joystick.device.pad import Pad
 from lira.tools.joystick.pad_detect import ASKS, Ask, moved_axis, pressed_button, to_toml
+from lira.tools.joystick.pads.mapping import Axis, load_mapping
+from lira.tools.joystick.pads.nodes import Node, is_any_pad, motion_of, read_nodes
 
 ANSWER_S, OPTIONAL_S = 30.0, 8.0
 LOOK_S = 0.1

@@ -5,7 +5,7 @@ from collections.abc import Iterator, Sequence
 
 from lira.hal.messages import OperatorRequest, Request
 from lira.tools.joystick.axes import PadState
-from lira.tools.joystick.mapping import Mapping
+from lira.tools.joystick.pads.mapping import Mapping
 
 HOLD_S = 1.0  # so long for what cannot be taken back
 

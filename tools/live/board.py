@@ -1,13 +1,14 @@
 """What a session tells while it goes on: on the bus for every screen, and in the terminal."""
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 from lira.fusion.log.counts import Ledger
 from lira.fusion.log.run_log import LapRecord
 from lira.fusion.teaching.session import Tally
 from lira.hal.messages import SessionState, Stage
+from lira.tools.live.before import Before
 from lira.tools.runs.progress import Say
 
 REPORT_S = 0.5
@@ -15,12 +16,27 @@ CURVE = 100  # laps
 
 
 class Board:
-    """The newest `state` of a session. `now` is the robot's clock."""
+    """The newest `state` of a session, which goes on from the days `before`. `now` is the robot's clock."""
 
     def __init__(
-        self, person: str, ledger: Ledger, now: Callable[[], float], publish: Callable[[SessionState], None], say: Say
+        self,
+        person: str,
+        before: Before,
+        ledger: Ledger,
+        now: Callable[[], float],
+        publish: Callable[[SessionState], None],
+        say: Say,
     ) -> None:
-        self.state = SessionState(now(), Stage.PRACTICE, person)
+        self.state = SessionState(
+            now(),
+            Stage.PRACTICE,
+            person,
+            laps=before.laps,
+            passed=before.passed,
+            collisions=before.collisions,
+            lost=before.lost,
+            curve=before.curve[-CURVE:],
+        )
         self._ledger, self._now, self._publish, self._say = ledger, now, publish, say
         self._shown_s = float("-inf")
 
@@ -50,8 +66,12 @@ class Board:
 
     def begin_lap(self) -> int:
         """Count one more lap of teaching. What was proven was another novice's."""
-        self.state = replace(self.state, laps=self.state.laps + 1, proven=0, shown=0)
+        self.state = replace(self.state, laps=self.state.laps + 1, proven=0, shown=0, converged=False)
         return self.state.laps
+
+    def give_back_lap(self) -> None:
+        """The lap that has begun was none."""
+        self.state = replace(self.state, laps=self.state.laps - 1)
 
     def end_lap(self, tally: Tally, record: LapRecord) -> None:
         """A lap of teaching is over."""
@@ -69,7 +89,10 @@ class Board:
             f"collisions {record.collisions}, lost {record.lost}, {record.human_labels} labels of yours"
         )
 
-    def note_proof(self, proof: list[LapRecord], words: str = "") -> None:
+    def note_proof(self, proof: Sequence[LapRecord]) -> None:
         """So far the novice has driven this alone."""
-        proven = sum(lap.passed for lap in proof)
-        self.state = replace(self.state, proven=proven, shown=len(proof), words=words or self.state.words)
+        self.state = replace(self.state, proven=sum(lap.passed for lap in proof), shown=len(proof))
+
+    def note_verdict(self, words: str, *, converged: bool) -> None:
+        """The proof is over."""
+        self.state = replace(self.state, words=words, converged=converged)

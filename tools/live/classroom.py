@@ -10,16 +10,16 @@ from lira.fusion.learning.labels import Label
 from lira.fusion.log.counts import Ledger
 from lira.fusion.log.label_edit import correct, last_intervention, read_heads
 from lira.fusion.log.label_log import Demonstration, DemonstrationLog, read_demonstrations
-from lira.fusion.log.run_log import RunRecord, StepRecord, read_run
+from lira.fusion.log.run_log import RunRecord
 from lira.fusion.methods.base import Method
 from lira.fusion.operator_service import Job
-from lira.hal.errors import ConfigError
-from lira.hal.messages import Decision, Driver
+from lira.hal.messages import Driver
 from lira.hal.profile import RobotProfile
-from lira.tools.runs.build import NewTrainer, build_method
+from lira.tools.live.before import days_before
+from lira.tools.runs.build import NewTrainer
 from lira.tools.runs.folder import LABELS, RECORD, snapshot
-from lira.tools.runs.progress import Say
-from lira.tools.runs.teach import Plan
+from lira.tools.runs.plan import Plan, build_traced
+from lira.tools.runs.progress import Publish, Say
 
 
 class Classroom:
@@ -28,13 +28,21 @@ class Classroom:
     Raises `StorageError` for a damaged or foreign log, `ConfigError` for another method than the folder's.
     """
 
-    def __init__(self, plan: Plan, profile: RobotProfile, world: str, trainer: NewTrainer, say: Say) -> None:
+    def __init__(
+        self,
+        plan: Plan,
+        profile: RobotProfile,
+        world: str,
+        trainer: NewTrainer,
+        say: Say,
+        publish: Publish | None = None,
+    ) -> None:
         assert plan.folder is not None
         self.folder: Path = plan.folder
         self._plan, self._profile, self._world = plan, profile, world
-        self._trainer, self._say = trainer, say
+        self._trainer, self._publish, self._say = trainer, publish, say
         self.head: RunRecord = plan.head(profile, world)
-        self.before = newest_decision(self.folder / RECORD, self.head)
+        self.before = days_before(self.folder / RECORD, self.head)
         self._log = self._open_log()
         try:
             self.method: Method = self._learned()
@@ -47,9 +55,9 @@ class Classroom:
         self._log.append(label)
 
     def go_on(self, ledger: Ledger) -> None:
-        """Have a ledger count on from the day before."""
-        if self.before is not None:
-            ledger.go_on(self.before.labels, self.before.interventions, self.before.calls)
+        """Have a ledger count on from the days before."""
+        if (newest := self.before.newest) is not None:
+            ledger.go_on(newest.labels, newest.interventions, newest.calls, self.before.account)
 
     def undo(self, ledger: Ledger) -> tuple[bool, str]:
         """Take the labels of the last intervention back; the learner begins anew without them."""
@@ -87,21 +95,9 @@ class Classroom:
         """A new learner that has learned all that is in the log."""
         plan = self._plan
         pair = plan.pair or task_of(self._world)
-        method = build_method(plan.preset, self._profile, plan.seed, self._trainer, pair, plan.more, plan.build)
+        method = build_traced(plan, self._profile, self._trainer, pair, self._publish)
         novice = method.novice
         for old in read_demonstrations(self.folder / LABELS):
             if old.stored:
-                novice.remember(Label(old.features, old.action, old.source, novice.weight(old.source)))
+                method.remember(Label(old.features, old.action, old.source, novice.weight(old.source)))
         return method
-
-
-def newest_decision(path: Path, head: RunRecord) -> Decision | None:
-    """What a folder's record ends with: its counts go on. Raises `ConfigError` if it is of another method or robot."""
-    newest: Decision | None = None
-    for record in read_run(path) if path.is_file() else ():
-        if isinstance(record, StepRecord):
-            newest = record.decision
-        elif isinstance(record, RunRecord) and (record.preset, record.profile) != (head.preset, head.profile):
-            what = f"{path.parent} was taught by '{record.preset}' on a '{record.profile}'"
-            raise ConfigError(what, "Go on with these, or choose another --run.")
-    return newest

@@ -39,6 +39,6 @@ def reply(request: Request, stage: Stage, *, trained: bool) -> Reply | None:
         return Reply((True, "the novice alone, to prove what it can: hands off"), Request.PROVE)
     if request is Request.UNDO and stage not in TAUGHT | {Stage.VERDICT}:
         return Reply((False, "not now: while it is taught, or at the verdict"))
-    if request is Request.RESET and stage in TAUGHT | {Stage.PROVING}:
+    if request is Request.RESET and stage in TAUGHT | {Stage.PROVING, Stage.EXAM}:
         return Reply((True, "a new lap"), Request.RESET)
     return None

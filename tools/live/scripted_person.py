@@ -13,6 +13,7 @@ import threading
 import time
 from collections.abc import Sequence
 from dataclasses import replace
+from typing import Protocol
 
 from msgspec import structs
 
@@ -36,6 +37,7 @@ from lira.hal.messages import (
     SessionState,
     Stage,
 )
+from lira.hal.profile import RobotProfile
 from lira.sim_backend.catalogue import load_world
 from lira.sim_backend.foresight import Foresight
 from lira.tools.joystick.client import TeleopClient
@@ -50,14 +52,27 @@ ZEROS_S = 0.5
 STOPPED = frozenset({Reason.STALE, Reason.NEUTRAL_FIRST, Reason.REFUSED})
 
 
+class Controls(Protocol):
+    """What the person has in hand: teleop itself, a pad, or a page. `action` None: hands off."""
+
+    action: Action | None
+
+    def ask(self, request: Request) -> None:
+        """Press the button for it."""
+
+
 class Thumb:
-    """Sends what the person holds, at the rate of a pad, from a thread. `action` None: hands off."""
+    """Sends what the person holds by teleop itself, at the rate of a pad, from a thread."""
 
     def __init__(self, client: TeleopClient, speed: float) -> None:
         self._client, self._period_s = client, 1.0 / (SEND_HZ * speed)
         self._zeros_s = ZEROS_S / speed
         self._applied: Applied | None = None
         self.action: Action | None = None
+
+    def ask(self, request: Request) -> None:
+        """Ask whoever learns."""
+        self._client.ask(OperatorRequest(request), time.monotonic())
 
     def run(self, stop: threading.Event) -> None:
         """Until told to stop; then let go."""
@@ -90,11 +105,15 @@ class Person:
             self._teacher.reset(session.layout)
         if session.stage is Stage.VERDICT:
             return STAND  # a hand on the controls goes on
-        if state.collided or state.lost or state.finished or session.stage in (Stage.PROVING, Stage.OVER):
+        if state.collided or state.lost or state.finished or session.stage in (Stage.PROVING, Stage.EXAM, Stage.OVER):
             return None
         if session.stage in (Stage.PRACTICE, Stage.READY) or decision is None:
             return self._teach(state, None)
         return self._teach(state, decision)
+
+    def close(self) -> None:
+        """Look no further ahead."""
+        self._teacher.close()
 
     def _teach(self, state: CourseState, decision: Decision | None) -> Action | None:
         """As the teacher does. What would drive is expected to go on as it is."""
@@ -131,11 +150,11 @@ def ahead(state: CourseState, lag_s: float) -> CourseState:
     )
 
 
-def live(client: TeleopClient, watch: Bus, person: Person, thumb: Thumb, speed: float, stop: threading.Event) -> None:
+def live(controls: Controls, watch: Bus, person: Person, period_s: float, speed: float, stop: threading.Event) -> None:
     """Look and act, a period at a time, until the session is over; end it once it has passed."""
     states, decisions, sessions = watch.reader(SIM_STATE), watch.reader(DECISION), watch.reader(SESSION)
     asked, proofs = False, 0
-    while not stop.wait(client.profile.period_s / speed):
+    while not stop.wait(period_s / speed):
         state, session = states.newest(), sessions.newest()
         decision = decisions.newest()
         if state is None or session is None:
@@ -146,15 +165,23 @@ def live(client: TeleopClient, watch: Bus, person: Person, thumb: Thumb, speed: 
         fresh = decision is not None and time.monotonic() - decision.arrived_s < DECISION.max_age_s
         if told.stage is Stage.TEACHING and told.passed > proofs:  # a lap went well: can it alone?
             proofs = told.passed
-            client.ask(OperatorRequest(Request.PROVE), time.monotonic())
-        passed = told.stage is Stage.VERDICT and told.shown > 0 and told.proven == told.shown
-        if passed:
+            controls.ask(Request.PROVE)
+        if told.stage is Stage.VERDICT and told.converged:
             if not asked:
-                client.ask(OperatorRequest(Request.FINISH), time.monotonic())
-            asked, thumb.action = True, None
+                controls.ask(Request.FINISH)
+            asked, controls.action = True, None
             continue
-        lag_s = (time.monotonic() - state.arrived_s) * speed + client.profile.period_s / 2
-        thumb.action = person.act(ahead(state.message, lag_s), decision.message if fresh and decision else None, told)
+        lag_s = (time.monotonic() - state.arrived_s) * speed + period_s / 2
+        heard = decision.message if fresh and decision is not None else None
+        controls.action = person.act(ahead(state.message, lag_s), heard, told)
+
+
+def person_for(profile: RobotProfile, world: str, layout: int, skill: str, seed: int) -> Person:
+    """A person who teaches in this world."""
+    settings = structs.replace(TEACHERS[skill], style="proportional")
+    foresight = Foresight(profile, load_world(world), layout)
+    experts = [expert for _, expert in load_pair(profile, task_of(world))]
+    return Person(ScriptedTeacher(foresight, profile, settings, seed), experts)
 
 
 def main() -> int:
@@ -166,21 +193,16 @@ def main() -> int:
     signal.signal(signal.SIGINT, lambda *_: stop.set())
     bus, watch = Bus(name, connect=endpoint), Bus(name, connect=endpoint, watch=True)
     client = TeleopClient(bus, watch, ANSWER_S)
-    foresight = Foresight(client.profile, load_world(world), int(layout))
-    teacher = ScriptedTeacher(
-        foresight, client.profile, structs.replace(TEACHERS[skill], style="proportional"), int(seed)
-    )
-    experts = [expert for _, expert in load_pair(client.profile, task_of(world))]
-    person, thumb = Person(teacher, experts), Thumb(client, float(speed))
+    person, thumb = person_for(client.profile, world, int(layout), skill, int(seed)), Thumb(client, float(speed))
     thread = threading.Thread(target=thumb.run, args=[stop], name="thumb")
     thread.start()
     print(READY, flush=True)
     try:
-        live(client, watch, person, thumb, float(speed), stop)
+        live(thumb, watch, person, client.profile.period_s, float(speed), stop)
     finally:
         stop.set()
         thread.join()
-        teacher.close()
+        person.close()
         watch.close()
         bus.close()
     return 0

@@ -11,18 +11,22 @@ from lira.fusion.learning.trainer import ProcessTrainer
 from lira.fusion.log.recorder import Journal
 from lira.fusion.log.run_log import RunWriter, VerdictRecord
 from lira.fusion.operator_service import OperatorService
-from lira.hal.bus.topics import DECISION, SESSION
+from lira.hal.bus.topics import SESSION
 from lira.hal.client.remote import RemoteRobot
 from lira.sim_backend.world import World
 from lira.tools.launch.lifetime import saving, stop_or_interrupt
+from lira.tools.live.board import Board
 from lira.tools.live.classroom import Classroom
-from lira.tools.live.session import LiveSession, Rules
+from lira.tools.live.lap_driver import LapDriver
+from lira.tools.live.rules import Rules
+from lira.tools.live.session import LiveSession
 from lira.tools.operator.voice import explain
+from lira.tools.recording.beside import recorder_beside
 from lira.tools.runs.course import Course
 from lira.tools.runs.folder import LABELS, RECORD, in_the_log
+from lira.tools.runs.plan import Plan
 from lira.tools.runs.progress import Say
-from lira.tools.runs.reach import FLOOR, hand_of, request_line
-from lira.tools.runs.teach import Plan
+from lira.tools.runs.reach import FLOOR, hand_of, reports_of, request_line
 
 
 @dataclass(frozen=True, slots=True)
@@ -39,39 +43,38 @@ def sit(args: argparse.Namespace, plan: Plan, robot: RemoteRobot, rules: Rules, 
     arena = robot.arena
     course = None
     if world is not None:
-        unseen = range(plan.layout + 1, plan.layout + 1 + plan.unseen)
-        course = Course(robot.profile, world, plan.layout, plan.preset.syllabus, plan.laps, unseen=unseen)
+        course = Course(robot.profile, world, plan.layout)
     name = FLOOR if world is None else world.name
     folder = plan.folder
     assert folder is not None
+    publish = reports_of(robot)
     with contextlib.ExitStack() as stack:
-        room = stack.enter_context(Classroom(plan, robot.profile, name, ProcessTrainer, say))
+        wait_for_recorder = stack.enter_context(recorder_beside(args, folder, say))
+        wait_for_recorder()
+        room = stack.enter_context(Classroom(plan, robot.profile, name, ProcessTrainer, say, publish))
         record = stack.enter_context(RunWriter(folder / RECORD))
         record.write(room.head)
-        decisions, sessions = robot.bus.publisher(DECISION), robot.bus.publisher(SESSION)
-        journal = Journal(
-            keep=room.keep, write=record.write, publish=lambda decision: decisions.put(decision, robot.now())
-        )
+        sessions = robot.bus.publisher(SESSION)
+        journal = Journal(keep=room.keep, write=record.write, publish=publish)
         room.go_on(journal.ledger)
         hand = stack.enter_context(hand_of(args))
         truth = None if arena is None else robot.link.state
-        session = LiveSession(
-            *(robot, arena, course, ControlLoop(robot, truth=truth), room, journal, hand, rules, say),
-            publish=lambda state: sessions.put(state, robot.now()),
-            explain=explain,
+        loop = ControlLoop(robot, truth=truth)
+        board = Board(
+            rules.person, room.before, journal.ledger, robot.now, lambda state: sessions.put(state, robot.now()), say
         )
+        driver = LapDriver(robot, arena, loop, room, journal, hand, rules, board, say, explain)
+        session = LiveSession(driver, course, room, journal, rules, say)
         stack.enter_context(saving(room.snapshot, say))
-        session.stop = stack.enter_context(stop_or_interrupt())
+        driver.stop = stack.enter_context(stop_or_interrupt())
         line = stack.enter_context(request_line(robot, args))
-        session.service = stack.enter_context(
+        driver.service = stack.enter_context(
             contextlib.closing(
-                OperatorService(
-                    line, session.loop, room.method, journal, say, snapshot=room.snapshot, session=session.take
-                )
+                OperatorService(line, loop, room.method, journal, say, snapshot=room.snapshot, session=session.take)
             )
         )
-        session.loop.arm()
-        if room.before is not None:
+        loop.arm()
+        if room.before.newest is not None:
             say(f"goes on with {room.method.novice.stored} labels from before")
         session.run()
         aside = in_the_log(folder / LABELS, room.method.novice.set_aside())

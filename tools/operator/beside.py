@@ -1,8 +1,8 @@
-"""A screen beside the robot: the sessions it needs, until it is told to end."""
+"""A screen or a pad beside the robot: the sessions it needs, until it is told to end."""
 
 import contextlib
 import threading
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from typing import NamedTuple
 
 from lira.hal.bus.bus import Bus
@@ -22,9 +22,9 @@ class Beside(NamedTuple):
     info: Info
     stop: threading.Event
 
-    def client(self) -> TeleopClient | None:
+    def client(self, say: Callable[[str], None] = print) -> TeleopClient | None:
         """What drives by hand; None beside a robot in lockstep, which no hand follows."""
-        return None if self.info.mode == LOCKSTEP else TeleopClient(self.bus, self.watch, ANSWER_S)
+        return None if self.info.mode == LOCKSTEP else TeleopClient(self.bus, self.watch, ANSWER_S, say)
 
 
 @contextlib.contextmanager

@@ -8,8 +8,8 @@ The first of these rules that holds decides: who must act comes before who drive
 | nothing is heard of the robot | no_link |
 | the dead-man is held | person; slowly: person_slow; paused: person_paused |
 | a request paused it | paused |
-| a session is at a stage that is the person's | practice, ready, judging, verdict |
-| a session proves on a twin | proving |
+| a session is at a stage that is the person's | practice, ready, judging, verdict, passed |
+| a session proves on a twin | proving, exam |
 | a twin's lap is over | collided, strayed, finished |
 | the governor lets nothing through | its reason |
 | the policy stands and waits for a person | waits, unknown |
@@ -40,6 +40,7 @@ class Situation(StrEnum):
     READY = "ready"
     JUDGING = "judging"
     VERDICT = "verdict"
+    PASSED = "passed"
     COLLIDED = "collided"
     STRAYED = "strayed"
     FINISHED = "finished"
@@ -58,6 +59,7 @@ class Situation(StrEnum):
     SHIELD = "shield"
     SHIELD_STANDS = "shield_stands"
     PROVING = "proving"
+    EXAM = "exam"
     NOVICE = "novice"
     MEAN = "mean"
     EXPERT = "expert"
@@ -84,7 +86,7 @@ URGENCY: dict[Situation, Urgency] = {
     **dict.fromkeys((_S.ESTOP, _S.ESTOP_CONFIRMED, _S.NO_LINK), Urgency.ALARM),
     **dict.fromkeys((_S.STALE, _S.NEUTRAL_FIRST, _S.NEUTRAL_HELD, _S.REFUSED, _S.DEVICE_LOST), Urgency.NEED),
     **dict.fromkeys((_S.COLLIDED, _S.STRAYED, _S.WAITS, _S.OBSTACLE, _S.UNKNOWN, _S.SHIELD_STANDS), Urgency.NEED),
-    **dict.fromkeys((_S.DISAGREE, _S.VERDICT, _S.READY), Urgency.ASK),
+    **dict.fromkeys((_S.DISAGREE, _S.VERDICT, _S.PASSED, _S.READY), Urgency.ASK),
     **dict.fromkeys((_S.ONE_EXPERT, _S.SHIELD, _S.JUDGING), Urgency.WATCH),
     **dict.fromkeys((_S.PAUSED, _S.FINISHED, _S.NO_COMMAND, _S.TOLD_TO_STAND, _S.PRACTICE), Urgency.IDLE),
 }
@@ -106,6 +108,7 @@ STAGES: dict[Stage, Situation] = {
     Stage.READY: _S.READY,
     Stage.JUDGING: _S.JUDGING,
     Stage.PROVING: _S.PROVING,
+    Stage.EXAM: _S.EXAM,
     Stage.VERDICT: _S.VERDICT,
 }
 
@@ -123,6 +126,8 @@ def situation_of(view: View) -> Situation:
         return _S.PAUSED
     standing = standing_of(applied, view.hand, decides=view.decision is not None)
     stage = None if view.teaching is None else STAGES.get(view.teaching.stage)
+    if stage is _S.VERDICT and view.teaching is not None and view.teaching.converged:
+        return _S.PASSED
     if stage is not None:
         return standing or stage if stage is _S.JUDGING else stage
     over = _lap_over(view) if view.teaching is None else None  # a session begins the next lap by itself

@@ -86,6 +86,8 @@ def _facts(view: View) -> dict[str, str]:
         "expert": "" if decision is None else decision.driver.upper(),
         "age": f" for {view.link_age_s:.0f} s" if heard else "",
         "verdict": "" if view.teaching is None else view.teaching.words,
+        "proven": "" if view.teaching is None else str(view.teaching.proven),
+        "shown": "" if view.teaching is None else str(view.teaching.shown),
         "lost": "" if view.applied is None else ", ".join(lost_devices(view.applied)),
     }
 

@@ -5,6 +5,7 @@ MCAP's profile ros2: topics with their ROS types and definitions, payloads in CD
 message (`hal.bus.attachment`) stands before it on a topic of its own, so that it can be sent again as it was.
 """
 
+import re
 from pathlib import Path
 
 import msgspec
@@ -46,6 +47,11 @@ class Head(msgspec.Struct, frozen=True):
         """Name of the twin's world, "" on a floor."""
         return _World.name_in(self.info.arena)
 
+    @property
+    def began_s(self) -> float:
+        """When it began, on the robot's clock."""
+        return self.to_robot_s(self.began_ns)
+
     def to_robot_s(self, time_ns: int) -> float:
         """Return a time of the file on the robot's clock."""
         return (time_ns - self.offset_ns) / 1e9
@@ -80,19 +86,22 @@ def head_from(metadata: dict[str, str], info: bytes) -> Head:
 
 
 def files_of(path: Path) -> list[Path]:
-    """Return the files of a recording in order: of a single one, of its folder, or of the folder of a run.
+    """Return the files of a recording in order: of a single one, of its folder, or of the folder of a run: then
+    those of its last day.
 
     Raises `StorageError` if there is none.
     """
     if path.is_file():
         return [path]
-    for folder in (path, path / FOLDER):
-        found = sorted(folder.glob(f"*{SUFFIX}"), key=_number)
+    newest = sorted(path.glob(f"{FOLDER}*"), key=lambda folder: _count(folder.name), reverse=True)
+    for folder in (path, *newest):
+        found = sorted(folder.glob(f"*{SUFFIX}"), key=lambda file: _count(file.stem))
         if found:
             return found
     raise StorageError(f"there is no recording at {path}", f"Name a {SUFFIX} file, or the folder of a run.")
 
 
-def _number(path: Path) -> tuple[str, int]:
-    name, _, number = path.stem.rpartition("_")
-    return (name, int(number)) if number.isdigit() else (path.stem, 0)
+def _count(name: str) -> tuple[str, int]:
+    """Split what ends in a number, so that 10 comes after 9."""
+    number = re.search(r"[-_](\d+)$", name)
+    return (name, 0) if number is None else (name[: number.start()], int(number[1]))

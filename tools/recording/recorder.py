@@ -22,6 +22,7 @@ POLL_S = 0.005
 FLUSH_S = 0.5  # what is younger may be lost when the process is killed
 LOOK_S = 2.0  # between two looks at the disk
 FIRST_S = 5.0
+UNIX_NS = 1_000_000_000
 LAST_S = 0.3  # so long it listens on when it is told to end: what was sent before is still under way
 WARN_S = 600.0  # of recording that the disk has room for
 SPARE_BYTES = 200 * 2**20  # are left to others: labels must not be lost to pictures
@@ -45,6 +46,8 @@ def listen(bus: Bus, version: str, command: str, stop: threading.Event) -> tuple
             sent = attachment_of(sample)
             if sent is not None and sent.epoch == info.epoch and sample.key in (APPLIED.key, CLOCK.key):
                 offset_ns = round(sample.arrived_s * 1e9) + local_ns - sent.time_ns
+                if abs(offset_ns) < UNIX_NS:
+                    offset_ns = 0  # the robot tells Unix time, and this message was so long under way
                 return Head(bus.robot, version, offset_ns, time.time_ns(), info, command), tap, heard
         time.sleep(POLL_S)
     raise BusError(f"the robot '{bus.robot}' answers and sends nothing", "Check that it runs: lira console shows it.")

@@ -9,16 +9,17 @@ PAGE = "report.html"
 COMPARISON = "comparison.html"
 
 
-def write_report(folder: Path) -> Path:
+def write_report(folder: Path, shown_as: str = "") -> Path:
     """Make `report.html` from the `run.jsonl` in a run's folder and return its path.
 
+    With `shown_as` it is for somebody who is not to know the method: by that letter, and without the command.
     Raises `StorageError` if there is no usable record, or the page cannot be written.
     """
-    from lira.tools.report.digest import load_run
+    from lira.tools.report.digest import blinded, load_run
     from lira.tools.report.page import render
 
-    page = folder / PAGE
-    write_whole(page, render(load_run(folder / RECORD)).encode())
+    page, run = folder / PAGE, load_run(folder / RECORD)
+    write_whole(page, render(blinded(run, shown_as) if shown_as else run).encode())
     return page
 
 

@@ -1,8 +1,10 @@
 """The records of one run, sorted into laps: what every part of the page is drawn from."""
 
-from collections.abc import Iterable, Iterator
-from dataclasses import dataclass, field
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass, field, replace
 from pathlib import Path
+
+from msgspec import structs
 
 from lira.fusion.log.run_log import (
     LapRecord,
@@ -16,24 +18,27 @@ from lira.fusion.log.run_log import (
 from lira.hal.errors import StorageError
 from lira.hal.messages import Action, Driver, Phase
 
+MOMENT_S = 2.0  # a lap of training that was cut off so soon was none: somebody asked for the proof
 PHASES = {Phase.TRAIN: "Training lap", Phase.PROVE: "Proving run", Phase.UNSEEN: "Unseen layout"}
 
 
 @dataclass(frozen=True, slots=True)
 class Lap:
-    """The steps of one lap in order; `record` is None for a lap that was cut off."""
+    """The steps of one lap in order; `record` is None for a lap that was cut off, `day` for a run of one day."""
 
     phase: Phase
     number: int
     layout: int
     steps: tuple[StepRecord, ...]
     record: LapRecord | None = None
+    day: int | None = None
 
     @property
     def title(self) -> str:
         """Name for headings: a training lap by its number, the others by what they prove."""
         name = PHASES.get(self.phase, self.phase)
-        return f"{name} {self.layout}" if self.phase == Phase.UNSEEN else f"{name} {self.number}"
+        name = f"{name} {self.layout}" if self.phase == Phase.UNSEEN else f"{name} {self.number}"
+        return name if self.day is None else f"Day {self.day}: {name[0].lower()}{name[1:]}"
 
     @property
     def began_s(self) -> float:
@@ -48,7 +53,10 @@ class Lap:
 
 @dataclass(frozen=True, slots=True)
 class Run:
-    """One run: how it began, its laps, how it ended (None: it was cut off)."""
+    """One run: how it began, its laps, how it ended (None: it was cut off).
+
+    Of a run that went on another day `head` is the newest, and `result` sums up the time of all days.
+    """
 
     head: RunRecord | None
     laps: tuple[Lap, ...]
@@ -82,12 +90,13 @@ class _Sorter:
     verdict: VerdictRecord | None = None
     laps: list[Lap] = field(default_factory=list)
     steps: list[StepRecord] = field(default_factory=list)
+    days: int = 0
+    times_s: tuple[float, float] = (0.0, 0.0)  # simulated and elapsed, of the days before
 
     def add(self, record: Record) -> None:
         match record:
             case RunRecord():
-                # A file that was appended to holds several runs: the last one counts.
-                self.head, self.result, self.verdict, self.laps, self.steps = record, None, None, [], []
+                self.begin_day(record)
             case StepRecord():
                 if self.steps and _key(self.steps[-1]) != _key(record):
                     self.end_lap(None)
@@ -95,9 +104,20 @@ class _Sorter:
             case LapRecord():
                 self.end_lap(record)
             case ResultRecord():
-                self.result = record
+                simulated_s, elapsed_s = self.times_s
+                self.result = structs.replace(
+                    record, simulated_s=record.simulated_s + simulated_s, elapsed_s=record.elapsed_s + elapsed_s
+                )
             case VerdictRecord():
                 self.verdict = record
+
+    def begin_day(self, head: RunRecord) -> None:
+        """A file that was appended to holds several days."""
+        self.end_lap(None)
+        if self.result is not None:
+            self.times_s = self.result.simulated_s, self.result.elapsed_s
+        self.head, self.result, self.verdict = head, None, None
+        self.days += 1
 
     def end_lap(self, record: LapRecord | None) -> None:
         if record is not None:
@@ -106,8 +126,16 @@ class _Sorter:
             phase, number, layout = _key(self.steps[0])
         else:
             return
-        self.laps.append(Lap(phase, number, layout, tuple(self.steps), record))
+        ended = bool(self.laps) and self.laps[-1].record is not None
+        if ended and record is None and phase == Phase.TRAIN and _lasted_s(self.steps) < MOMENT_S:
+            self.steps = []
+            return
+        self.laps.append(Lap(phase, number, layout, tuple(self.steps), record, self.days))
         self.steps = []
+
+
+def _lasted_s(steps: Sequence[StepRecord]) -> float:
+    return steps[-1].decision.stamp_s - steps[0].decision.stamp_s
 
 
 def _key(step: StepRecord) -> tuple[Phase, int, int]:
@@ -120,11 +148,20 @@ def digest(records: Iterable[Record]) -> Run:
     for record in records:
         sorter.add(record)
     sorter.end_lap(None)
+    laps = sorter.laps if sorter.days > 1 else [replace(lap, day=None) for lap in sorter.laps]
     experts: dict[str, None] = {}
-    for lap in sorter.laps:
+    for lap in laps:
         for step in lap.steps[:1]:
             experts |= dict.fromkeys(view.name for view in step.decision.experts)
-    return Run(sorter.head, tuple(sorter.laps), sorter.result, tuple(experts), sorter.verdict)
+    return Run(sorter.head, tuple(laps), sorter.result, tuple(experts), sorter.verdict)
+
+
+def blinded(run: Run, letter: str) -> Run:
+    """The same run, of which nobody reads by which method it was taught."""
+    if run.head is None:
+        return run
+    name = f"Method {letter}"
+    return replace(run, head=structs.replace(run.head, method=name, preset=name, command=""))
 
 
 def load_run(path: Path) -> Run:

@@ -68,7 +68,7 @@ def head(run: Run, title: str) -> str:
     contradictions = "" if run.result is None else contradiction_words(run.result.contradictions)
     if contradictions:
         parts.append(f"<p>{escape(contradictions[0].upper() + contradictions[1:])}.</p>")
-    if run.head:
+    if run.head and run.head.command:
         parts.append(f"<p>To repeat it:</p><pre>{escape(run.head.command)}</pre>")
     return "".join(parts)
 

@@ -1,20 +1,23 @@
 """What a ROS graph commands, passed on to the robot: velocities with and without a stamp, and the emergency stop."""
 
 import sys
+from dataclasses import replace
+from functools import partial
 from typing import Protocol
 
 from lira.hal.bus.attachment import Attachment
 from lira.hal.bus.bus import Bus
 from lira.hal.bus.publisher import Publisher
-from lira.hal.bus.reader import Reader, Received
+from lira.hal.bus.reader import Received
 from lira.hal.bus.topics import CMD_VEL, ESTOP, TELEOP, Topic
 from lira.hal.messages import Bool, Twist, TwistStamped, is_neutral
+from lira.hal.profile import Control
 from lira.hal.rmw.attachment import parse_rmw_attachment
 from lira.hal.ros_graph.node import RosNode
+from lira.hal.server.command_watch import CommandWatch, Noted
 from lira.tools.ros2.commanders import Commanders
 
 DEPTH = 32
-STAMPED_BYTES = 1024  # a TwistStamped has the name of a frame besides
 NO_ROBOT = "the robot is not heard"
 
 
@@ -31,10 +34,15 @@ class Commands:
     A hand's zero means that it lets go, as on the bus from whoever cannot say so in another way.
     """
 
-    def __init__(self, bus: Bus, node: RosNode, salt: bytes, robot_time: RobotTime) -> None:
+    def __init__(self, bus: Bus, node: RosNode, control: Control, salt: bytes, robot_time: RobotTime) -> None:
         commanders = Commanders(salt)
-        self._ways = [_Way(bus, node, topic, commanders, robot_time) for topic in (CMD_VEL, TELEOP)]
-        self._robot_time = robot_time
+        timeouts = {CMD_VEL: control.policy_timeout_s, TELEOP: control.teleop_timeout_s}
+        self._watch = CommandWatch()
+        self._advised: set[str] = set()
+        self._ways = [
+            _Way(bus, node, topic, commanders, robot_time, partial(self._watch.note_ros, timeout_s=timeout_s))
+            for topic, timeout_s in timeouts.items()
+        ]
         self._estop = node.reader(ESTOP, DEPTH)
         self._press: Publisher[Bool] = bus.publisher(ESTOP)
 
@@ -46,23 +54,44 @@ class Commands:
         for way in self._ways:
             way.relay()
 
+    def advise(self, now_s: float, *, armed: bool) -> None:
+        """Say, once each, why what is commanded does not drive: ROS has no word for it. `now_s` is monotonic."""
+        for advice in set(self._watch.advice(now_s, armed=armed)) - self._advised:
+            self._advised.add(advice)
+            print(advice, file=sys.stderr, flush=True)
+
+
+class Note(Protocol):
+    """What is told of each command that came, for advice."""
+
+    def __call__(self, key: str, sender: str, *, noted: Noted) -> None:
+        """Note it."""
+
 
 class _Way:
     """One topic of commands."""
 
     def __init__(
-        self, bus: Bus, node: RosNode, topic: Topic[Twist], commanders: Commanders, robot_time: RobotTime
+        self,
+        bus: Bus,
+        node: RosNode,
+        topic: Topic[Twist],
+        commanders: Commanders,
+        robot_time: RobotTime,
+        note: Note,
     ) -> None:
         self._key = topic.key
         self._hand = topic is TELEOP
         self._commanders = commanders
         self._robot_time = robot_time
         self._boundary = node.boundary
-        self._plain: Reader[Twist] = node.reader(topic, DEPTH)
+        self._note = note
+        # Each type has a key of its own in such a graph.
+        plain: Topic[Twist] = replace(topic, stamped=None)
         stamped: Topic[TwistStamped] = Topic(
-            topic.key, TwistStamped, topic.rate_hz, topic.max_age_s, topic.qos, STAMPED_BYTES
+            topic.key, TwistStamped, topic.rate_hz, topic.max_age_s, topic.qos, topic.max_bytes
         )
-        self._stamped = node.reader(stamped, DEPTH)
+        self._plain, self._stamped = node.reader(plain, DEPTH), node.reader(stamped, DEPTH)
         self._epoch = 0  # in whose name the next is sent
         self._publisher: Publisher[Twist] = bus.publisher(topic, attach=self._attach)
 
@@ -79,6 +108,8 @@ class _Way:
             if isinstance(order, str) or now_s is None:
                 self._refuse(order if isinstance(order, str) else NO_ROBOT)
                 return
+            age_s = order.age_s if stamp_s else None
+            self._note(self._key, f"{order.epoch}", noted=Noted(received.arrived_s, age_s, not is_neutral(twist)))
             self._epoch = order.epoch
             released = self._hand and is_neutral(twist)
             self._publisher.put(twist, now_s - order.age_s, seq=order.seq, released=released)

@@ -7,6 +7,7 @@ other: what ROS commands is judged by the governor there, under the lease, and e
 import itertools
 import secrets
 import threading
+import time
 from collections.abc import Callable
 from contextlib import ExitStack
 
@@ -15,6 +16,7 @@ from lira.hal.bus.services import LOCKSTEP, info_from_json
 from lira.hal.bus.topics import APPLIED, INFO
 from lira.hal.clock import ClockEstimate
 from lira.hal.errors import ConfigError
+from lira.hal.messages import Reason
 from lira.hal.ros_graph.node import RosNode
 from lira.tools.ros2.commands import Commands
 from lira.tools.ros2.graph import Graph
@@ -38,8 +40,9 @@ class Offer:
         self._applied = bus.reader(APPLIED, 8)
         self._clock = ClockEstimate()
         self._heard_s = float("-inf")
+        self._armed = False
         self._telemetry = Telemetry(bus, node, said_by(info.profile, arena=arena))
-        self._commands = Commands(bus, node, secrets.token_bytes(16), self._robot_time)
+        self._commands = Commands(bus, node, info.profile.control, secrets.token_bytes(16), self._robot_time)
         self._services = Services(bus, node, arena=arena)
 
     def run(self, stop: threading.Event) -> None:
@@ -55,6 +58,7 @@ class Offer:
                 self._telemetry.relay()
             if turn % LOOK_TURNS == 0:
                 self._telemetry.look()
+                self._commands.advise(time.monotonic(), armed=self._armed)
 
     def _listen(self) -> None:
         for received in self._applied.poll():
@@ -62,6 +66,7 @@ class Offer:
                 sent.epoch, sent.time_s, received.arrived_s
             ):
                 self._heard_s = received.arrived_s
+                self._armed = received.message.reason is not Reason.NEUTRAL_FIRST
 
     def _robot_time(self, local_s: float) -> float | None:
         return self._clock.now(local_s) if local_s - self._heard_s < LOST_S else None

@@ -45,17 +45,18 @@ class Course:
 
     def taught(self, number: int, /) -> Sequence[Drive]:
         """The training lap of this number, from 1."""
-        return [self._lap(self.syllabus.taught(self.layout, number))]
+        return [self.lap(self.syllabus.taught(self.layout, number))]
 
     def proven(self, number: int, /) -> Sequence[Sequence[Drive]]:
         """The proving runs after it."""
-        return [[self._lap(layout)] for layout in self.syllabus.proven(self.layout, number)]
+        return [[self.lap(layout)] for layout in self.syllabus.proven(self.layout, number)]
 
     def shown(self) -> Sequence[Drive]:
         """Laps of layouts that nobody was taught on."""
-        return [self._lap(layout) for layout in self.unseen]
+        return [self.lap(layout) for layout in self.unseen]
 
-    def _lap(self, layout: int) -> Drive:
+    def lap(self, layout: int) -> Drive:
+        """A lap on a layout."""
         return lap(self.profile, self.world, layout)
 
 

@@ -11,10 +11,10 @@ import msgspec
 from lira.fusion.log.run_log import LapRecord, Record, ResultRecord, RunRecord, StepRecord, VerdictRecord
 from lira.hal.config import MALFORMED
 from lira.hal.errors import StorageError
-from lira.hal.messages import Call, Decision, Phase
+from lira.hal.messages import Call, Decision, MethodCalls, Phase
 from lira.tools.output.proven import proof_words
 
-Publish = Callable[[Decision], None]
+Publish = Callable[[Decision | MethodCalls], None]
 Say = Callable[[str], None]
 
 PHASES = {Phase.TRAIN: "training lap", Phase.PROVE: "proving run", Phase.UNSEEN: "unseen layout"}

@@ -8,15 +8,17 @@ import msgspec
 
 from lira.fusion.operator_service import RequestLine
 from lira.hal.bus.bus import Bus
-from lira.hal.bus.topics import DECISION
+from lira.hal.bus.services import LOCKSTEP
+from lira.hal.bus.topics import DECISION, IN_LOCKSTEP, METHOD
 from lira.hal.client.arena import WiredArena
 from lira.hal.client.remote import RemoteArena, RemoteRobot
 from lira.hal.errors import ConfigError
-from lira.hal.messages import Decision, Episode
+from lira.hal.messages import Episode
 from lira.hal.port import Arena
 from lira.sim_backend.world import World
 from lira.tools.launch.lifetime import CLOSE_S
 from lira.tools.live.hand import Hand
+from lira.tools.runs.progress import Publish
 
 FLOOR = "floor"  # the world of a robot that is in none of ours
 PAUSED = "paused: P on a screen, or square on the pad, begins"
@@ -77,10 +79,14 @@ def world_of(robot: RemoteRobot) -> str:
     return FLOOR if world is None else world.name
 
 
-def decisions_of(robot: RemoteRobot) -> Callable[[Decision], None]:
-    """Return what puts decisions on the bus."""
-    topic = robot.bus.publisher(DECISION)
-    return lambda decision: topic.put(decision, robot.now())
+def reports_of(robot: RemoteRobot) -> Publish:
+    """Return what puts decisions, and the calls of the method that made them, on the bus.
+
+    In lockstep nothing of it is lost: time waits.
+    """
+    qos = IN_LOCKSTEP if robot.info.mode == LOCKSTEP else None
+    topics = {topic.kind: robot.bus.publisher(topic, qos) for topic in (DECISION, METHOD)}
+    return lambda report: topics[type(report)].put(report, robot.now())
 
 
 def say(line: str) -> None:

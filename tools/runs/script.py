@@ -21,8 +21,9 @@ from lira.hal.messages import STOP, Command
 from lira.hal.port import Robot
 from lira.hal.safety.governed import GovernedRobot
 from lira.sim_backend.world import World
+from lira.tools.runs.plan import Plan
 from lira.tools.runs.simulated import SimulatedRobot
-from lira.tools.runs.teach import Plan, Taught, teach_on
+from lira.tools.runs.teach import Taught, teach_on
 
 
 def drive(

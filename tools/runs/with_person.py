@@ -15,11 +15,12 @@ from lira.hal.client.remote import RemoteRobot
 from lira.tools.launch.lifetime import saving, stop_or_interrupt
 from lira.tools.launch.notify import Notifier
 from lira.tools.operator.voice import explain
-from lira.tools.runs.build import NewTrainer, build_method
+from lira.tools.recording.beside import recorder_beside
+from lira.tools.runs.build import NewTrainer
 from lira.tools.runs.folder import LABELS, RECORD, snapshot
+from lira.tools.runs.plan import Plan, build_traced
 from lira.tools.runs.progress import Publish, Say
 from lira.tools.runs.reach import PAUSED, hand_of, request_line, restarter, world_of
-from lira.tools.runs.teach import Plan
 
 
 def learn_from_person(
@@ -34,14 +35,16 @@ def learn_from_person(
     with (
         DemonstrationLog(folder / LABELS, profile, mirrored=plan.preset.mirrored, say=say) as log,
         RunWriter(folder / RECORD) as record,
+        recorder_beside(args, folder, say) as wait_for_recorder,
     ):
-        method = build_method(plan.preset, profile, plan.seed, trainer, plan.pair or task_of(world), plan.more)
+        wait_for_recorder()
+        method = build_traced(plan, profile, trainer, plan.pair or task_of(world), publish)
         novice = method.novice
         with saving(lambda: snapshot(folder, novice, profile, head), say), contextlib.closing(method):
             record.write(head)
             for old in read_demonstrations(log.path):
                 if old.stored:
-                    novice.remember(Label(old.features, old.action, old.source, novice.weight(old.source)))
+                    method.remember(Label(old.features, old.action, old.source, novice.weight(old.source)))
             journal, loop = Journal(keep=log.append, write=record.write, publish=publish), ControlLoop(robot)
             with stop_or_interrupt() as stop, request_line(robot, args) as line, hand_of(args) as hand:
                 service = OperatorService(

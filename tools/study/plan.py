@@ -30,7 +30,7 @@ class StudyPlan(Table, frozen=True):
     minutes: Annotated[float, Meta(gt=0.0, le=240.0)] = 15.0
     until_passed: bool = True
     unseen: Annotated[int, Meta(ge=0, le=80)] = 3
-    speed: Annotated[float, Meta(ge=0.7, le=5.0)] = 1.0
+    speed: Annotated[float, Meta(ge=0.4, le=5.0)] = 1.0
     questions: tuple[Words, ...] = ()
 
     def __post_init__(self) -> None:

@@ -6,12 +6,17 @@ import msgspec
 
 from lira.fusion.experts.tasks import TASKS, task_of
 from lira.fusion.learning.trainer import InlineTrainer
+from lira.fusion.log.run_log import RunWriter, VerdictRecord
 from lira.fusion.methods.presets import method_named
 from lira.fusion.methods.syllabus import THESIS
+from lira.hal.messages import Phase
 from lira.hal.profile import load_profile
 from lira.sim_backend.catalogue import load_world
+from lira.tools.live.verdict import has_passed, verdict_words
+from lira.tools.runs.folder import RECORD
+from lira.tools.runs.plan import Plan
 from lira.tools.runs.simulated import simulate
-from lira.tools.runs.teach import Plan, teach_on
+from lira.tools.runs.teach import teach_on
 from lira.tools.study.plan import StudyPlan
 from lira.tools.study.questions import SCALES, Answered
 
@@ -41,7 +46,11 @@ def teach_block(plan: StudyPlan, method: str, participant: int, folder: Path) ->
         command="lira study --dry-run",
     )
     with simulate(world, profile, layout=plan.layout, seed=plan.seed + participant) as robot:
-        teach_on(robot, robot.arena, world, taught, InlineTrainer)
+        laps = teach_on(robot, robot.arena, world, taught, InlineTrainer).laps
+    proof = [lap for lap in laps if lap.phase == Phase.PROVE][-1:]
+    proof += [lap for lap in laps if lap.phase == Phase.UNSEEN]
+    with RunWriter(folder / RECORD) as record:  # as a session of a person ends
+        record.write(VerdictRecord(skill_of(participant), verdict_words(proof), has_passed(proof)))
 
 
 def answer(participant: int, place: int, questions: tuple[str, ...]) -> Answered:

@@ -46,6 +46,7 @@ GROUPS = {
     ("records", "Records"): {
         "record": "record everything on a robot's bus, for later and for others' tools",
         "info": "what a recording holds",
+        "rerun": "put a recorded run through its method again: the same, or what would have been otherwise",
         "report": "make the HTML page of a recorded run",
     },
     ("operation", "Operation"): {

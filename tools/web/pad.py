@@ -6,7 +6,7 @@ import time
 
 from lira.hal.errors import DeviceError
 from lira.tools.joystick.axes import PadState
-from lira.tools.joystick.mapping import Mapping
+from lira.tools.joystick.pads.mapping import Mapping
 from lira.tools.web.seat import Client, Seat, pad_of
 
 

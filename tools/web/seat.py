@@ -13,8 +13,8 @@ import msgspec
 from msgspec import Meta
 
 from lira.tools.joystick.axes import AxisRange, PadState
-from lira.tools.joystick.codes import AXES, BUTTONS
-from lira.tools.joystick.mapping import Mapping, load_mapping
+from lira.tools.joystick.pads.codes import AXES, BUTTONS
+from lira.tools.joystick.pads.mapping import Mapping, load_mapping
 
 SILENT_S = 0.12  # three words that did not come
 OLDEST_S = 0.15  # between a frame and a word that answers it; what is older came over a link that holds things up

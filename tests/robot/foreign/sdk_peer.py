@@ -5,7 +5,6 @@ met it writes as one JSON object.
 """
 
 import json
-import math
 import sys
 import time
 from pathlib import Path
@@ -98,5 +97,7 @@ scan, odom, picture = newest.get("/scan"), newest.get("/odom"), newest.get("/cam
 found["scan"] = None if scan is None else [scan.header.frame_id, len(scan.ranges), float(scan.angle_increment)]
 found["odom"] = None if odom is None else [odom.twist.twist.linear.x, odom.pose.pose.position.x]
 found["picture"] = None if picture is None else [picture.format, bytes(picture.data[:3]).hex()]
-found["tf"] = [[each.header.frame_id, each.child_frame_id] for each in newest["/tf"].transforms] if "/tf" in newest else None
+found["tf"] = (
+    [[each.header.frame_id, each.child_frame_id] for each in newest["/tf"].transforms] if "/tf" in newest else None
+)
 print(json.dumps(found))

@@ -14,8 +14,8 @@ from lira.hal.bus.topics import INFO
 from lira.tools.bench.takeover import PipePad
 from lira.tools.joystick.bridge import Bridge
 from lira.tools.joystick.client import TeleopClient
-from lira.tools.joystick.codes import AXES, BUTTONS, EV_ABS, EV_KEY
 from lira.tools.joystick.known_pads import PadMemory
+from lira.tools.joystick.pads.codes import AXES, BUTTONS, EV_ABS, EV_KEY
 from lira.tools.stop_test.control import listen
 
 READY = "a hand by word"

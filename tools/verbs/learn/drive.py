@@ -52,8 +52,8 @@ def run(args: argparse.Namespace) -> int:
     from lira.fusion.inference.threads import one_thread
     from lira.hal.client.remote import connect
     from lira.tools.runs.alone import examine, show
-    from lira.tools.runs.reach import decisions_of, say
+    from lira.tools.runs.reach import reports_of, say
 
     one_thread()
     with connect(args.connect, args.name, close_s=CLOSE_S) as robot:
-        return (examine if args.unseen else show)(args, robot, decisions_of(robot), say)
+        return (examine if args.unseen else show)(args, robot, reports_of(robot), say)

@@ -29,6 +29,7 @@ from lira.tools.options import (
     add_pair,
     add_paused,
     add_protocol,
+    add_record,
     add_seed,
     add_shield,
     natural,
@@ -36,7 +37,7 @@ from lira.tools.options import (
 
 if TYPE_CHECKING:
     from lira.hal.client.remote import RemoteRobot
-    from lira.tools.runs.teach import Plan
+    from lira.tools.runs.plan import Plan
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -56,6 +57,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_seed(parser, "seeds teacher and training")
     add = parser.add_argument
     add("--run", type=Path, metavar="DIR", help="folder for what is learned (default: runs/<method>)")
+    add_record(parser)
     add("--as-command", help=argparse.SUPPRESS)  # what a report shows as the command that repeats the run
 
 
@@ -103,18 +105,18 @@ def run(args: argparse.Namespace) -> int:
         if args.teacher == "none":
             return learn_by_hand(args, plan, robot)
         from lira.tools.runs.on_twin import teach
-        from lira.tools.runs.reach import decisions_of, say
+        from lira.tools.runs.reach import reports_of, say
 
-        return teach(args, plan, robot, decisions_of(robot), say)
+        return teach(args, plan, robot, reports_of(robot), say)
 
 
 def learn_by_hand(args: argparse.Namespace, plan: "Plan", robot: "RemoteRobot") -> int:
     """Learn from whoever takes control."""
     from lira.fusion.learning.trainer import ProcessTrainer
-    from lira.tools.runs.reach import decisions_of, say
+    from lira.tools.runs.reach import reports_of, say
     from lira.tools.runs.with_person import learn_from_person
 
-    return learn_from_person(args, plan, robot, ProcessTrainer, decisions_of(robot), say)
+    return learn_from_person(args, plan, robot, ProcessTrainer, reports_of(robot), say)
 
 
 def plan_of(args: argparse.Namespace) -> "Plan":
@@ -123,7 +125,7 @@ def plan_of(args: argparse.Namespace) -> "Plan":
 
     from lira.fusion.methods.presets import file_name, method_named
     from lira.fusion.methods.syllabus import with_proof
-    from lira.tools.runs.teach import Plan
+    from lira.tools.runs.plan import Plan
 
     preset = method_named(args.method)
     if args.start is not None:

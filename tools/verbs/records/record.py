@@ -25,7 +25,6 @@ from lira.tools.options import DEFAULT, add_client, natural
 if TYPE_CHECKING:
     from threading import Event
 
-READY = "records '"  # at the beginning of the line that says that it hears everything
 NICENESS = 5
 
 
@@ -60,6 +59,7 @@ def record(args: argparse.Namespace, stop: "Event") -> int:
     from lira.tools.cli import version
     from lira.tools.launch.lifetime import CLOSE_S
     from lira.tools.launch.notify import Notifier
+    from lira.tools.recording.beside import READY
     from lira.tools.recording.recorder import Recorder, listen
     from lira.tools.recording.writer import RecordingWriter
     from lira.tools.runs.reach import say

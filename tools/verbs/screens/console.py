@@ -16,8 +16,6 @@ from pathlib import Path
 
 from lira.tools.options import add_client
 
-ANSWER_S = 10.0
-
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""

@@ -17,11 +17,8 @@ import argparse
 import sys
 from pathlib import Path
 
-from lira.hal.errors import DeviceError
-from lira.tools.launch.lifetime import CLOSE_S, stop_or_interrupt
+from lira.hal.errors import ConfigError, DeviceError
 from lira.tools.options import add_client
-
-ANSWER_S = 10.0
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -39,12 +36,12 @@ def run(args: argparse.Namespace) -> int:
     if not sys.platform.startswith("linux"):
         raise DeviceError("gamepads are read through Linux's evdev", "Use `lira console`, which has a keyboard.")
     if args.rules:
-        from lira.tools.joystick.rules import rules_text
+        from lira.tools.joystick.device.rules import rules_text
 
         sys.stdout.write(rules_text())
         return 0
-    from lira.tools.joystick.finder import Finder
-    from lira.tools.joystick.mapping import load_mapping
+    from lira.tools.joystick.device.finder import Finder
+    from lira.tools.joystick.pads.mapping import load_mapping
 
     mapping = None if args.pad is None else load_mapping(args.pad)
     if args.learn is not None:
@@ -52,30 +49,22 @@ def run(args: argparse.Namespace) -> int:
 
         return learn(args.learn, args.device)
 
-    from lira.hal.bus.bus import Bus
-    from lira.hal.bus.topics import INFO
     from lira.tools.joystick.bridge import Bridge
-    from lira.tools.joystick.client import TeleopClient
     from lira.tools.joystick.known_pads import PadMemory, state_file
     from lira.tools.launch.notify import Notifier
+    from lira.tools.operator.beside import beside
 
     notifier = Notifier.from_environment()
-    bus, watch = Bus(args.name, connect=args.connect), None
-    try:
-        with stop_or_interrupt() as stop:
-            bus.ask(INFO, timeout_s=ANSWER_S)
-            watch = Bus(args.name, connect=args.connect, watch=True)
-            client = TeleopClient(bus, watch, ANSWER_S, say)
-            finder = Finder(mapping, args.device)
-            bridge = Bridge(client, finder, PadMemory(state_file(), say), say, finder.advice)
-            words = f"joystick drives '{args.name}' at {args.connect}"
-            say(f"{words}; stop with Ctrl-C")
-            notifier.ready(words)
-            bridge.run(stop, notifier.alive)
-    finally:
-        for session in (bus, watch):
-            if session is not None:
-                session.close(CLOSE_S)
+    with beside(args.name, args.connect) as robot:
+        client = robot.client(say)
+        if client is None:
+            raise ConfigError(f"'{args.name}' waits for each command: no hand drives it", "Run it without --lockstep.")
+        finder = Finder(mapping, args.device)
+        bridge = Bridge(client, finder, PadMemory(state_file(), say), say, finder.advice)
+        words = f"joystick drives '{args.name}' at {args.connect}"
+        say(f"{words}; stop with Ctrl-C")
+        notifier.ready(words)
+        bridge.run(robot.stop, notifier.alive)
     return 0
 
 

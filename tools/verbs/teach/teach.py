@@ -7,7 +7,7 @@ the pad. On a real robot you judge: passed, failed, or take over. U takes the la
 
 examples:
   lira teach --as ada                                  on a twin; then, in another shell: lira web
-  lira teach --as ada --speed 0.7                      slower than real time, for the first time
+  lira teach --as ada --speed 0.5                      slower than real time, for the first time
   lira teach --as ada --run runs/teach-ada             go on another day: labels and counts go on
   lira teach --connect 192.168.1.20:7447 --as ada      a robot that is there
   lira teach --world line-obstacles --person scripted  a script drives by teleop as a hand would, at 2.5 times real time
@@ -27,14 +27,13 @@ from typing import TYPE_CHECKING
 
 from lira.hal.bus.endpoint import DEFAULT_ENDPOINT, DEFAULT_ROBOT
 from lira.hal.errors import ConfigError
-from lira.tools.options import DEFAULT, add_expert, add_layout, add_seed, natural
+from lira.tools.options import DEFAULT, add_expert, add_layout, add_record, add_seed, natural
 
 if TYPE_CHECKING:
-    from lira.tools.runs.teach import Plan
+    from lira.tools.runs.plan import Plan
 
 SCRIPT_SPEED = 2.5
-# Slower, a client's estimate of the twin's clock runs so far ahead of it that commands would be refused.
-SLOWEST, FASTEST = 0.7, 5.0
+SLOWEST, FASTEST = 0.4, 5.0  # of a person's; slower, a screen would take what the twin says for old
 READY_S = 90.0
 NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_-]{0,31}")
 
@@ -68,7 +67,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add("--speed", type=_speed, help="of the twin, times real time (default: 1; with a scripted person 2.5)")
     add("--method", default="plus", help=f"way of teaching, as in `lira fusion` {DEFAULT}")
     add("--practice", type=float, metavar="S", help="seconds of driving before it counts (default: 15, scripted: 2)")
-    add("--unseen", type=natural, default=3, help=f"layouts that the novice has not seen, to prove itself {DEFAULT}")
+    add("--unseen", type=natural, default=12, help=f"layouts that the novice has not seen, to prove itself {DEFAULT}")
     add("--laps", type=natural, default=100, help=f"end after so many laps of teaching {DEFAULT}")
     add("--minutes", type=float, metavar="M", help="end after so many minutes of teaching (default: when you end it)")
     add("--whole-time", action="store_true", help="with --minutes: go on though the novice has passed")
@@ -83,7 +82,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         default="hand",
         help="who drives: a hand, or on a twin a script with few, no or many human faults (for tests)",
     )
+    add("--shown-as", default="", help=argparse.SUPPRESS)  # in a study: the letter of a method that is not to be known
     add("--run", type=Path, metavar="DIR", help="folder of the session; one that is there goes on (default: a new one)")
+    add_record(parser)
 
 
 def run(args: argparse.Namespace) -> int:
@@ -93,7 +94,7 @@ def run(args: argparse.Namespace) -> int:
     from lira.fusion.inference.threads import one_thread
     from lira.hal.client.remote import connect
     from lira.tools.launch.lifetime import CLOSE_S
-    from lira.tools.live.session import Rules
+    from lira.tools.live.rules import Rules
     from lira.tools.live.sitting import sit
     from lira.tools.runs.reach import say
 
@@ -104,9 +105,7 @@ def run(args: argparse.Namespace) -> int:
     one_thread()
     args.speed = args.speed or (SCRIPT_SPEED if scripted else 1.0)
     practice_s = args.practice if args.practice is not None else 2.0 if scripted else 15.0
-    rules = Rules(
-        practice_s=practice_s, person=args.who, laps=args.laps, minutes=args.minutes, whole_time=args.whole_time
-    )
+    rules = Rules(practice_s, args.who, args.laps, args.minutes, args.whole_time, args.unseen)
     with contextlib.ExitStack() as stack:
         stack.enter_context(robot_of(args))
         robot = stack.enter_context(connect(args.connect, args.name, close_s=CLOSE_S))
@@ -115,7 +114,7 @@ def run(args: argparse.Namespace) -> int:
         else:
             say(f"drive '{args.name}' at {args.connect} with lira web, lira console or lira joystick")
         outcome = sit(args, plan, robot, rules, say)
-    return conclude(args.run, outcome.passed)
+    return conclude(args.run, outcome.passed, args.shown_as)
 
 
 def plan_of(args: argparse.Namespace) -> "Plan":
@@ -124,7 +123,7 @@ def plan_of(args: argparse.Namespace) -> "Plan":
 
     from lira.fusion.methods.presets import method_named
     from lira.fusion.methods.syllabus import THESIS
-    from lira.tools.runs.teach import Plan
+    from lira.tools.runs.plan import Plan
 
     preset = method_named(args.method)
     if not preset.approach.learns:
@@ -177,7 +176,7 @@ def script_of(args: argparse.Namespace) -> Iterator[None]:
         yield
 
 
-def conclude(folder: Path, passed: bool | None) -> int:
+def conclude(folder: Path, passed: bool | None, shown_as: str) -> int:
     """Write the report, and say where it is and what to do with it."""
     from lira.tools.output.table import format_table
     from lira.tools.report import RECORD, write_report
@@ -188,6 +187,7 @@ def conclude(folder: Path, passed: bool | None) -> int:
     print(f"\n{format_table(COLUMNS, [lap_cells(lap) for lap in recorded.laps])}\n")
     if recorded.verdict is not None:
         print(f"{recorded.verdict.words}.")
-    print(f"report: {write_report(folder)}")
-    print(f"go on another day: lira teach --run {shlex.quote(str(folder))}")
+    print(f"report: {write_report(folder, shown_as)}")
+    if not shown_as:
+        print(f"go on another day: lira teach --run {shlex.quote(str(folder))}")
     return 1 if passed is False else 0

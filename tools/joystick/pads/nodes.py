@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from lira.tools.joystick.codes import INPUT_PROP_ACCELEROMETER
+from lira.tools.joystick.pads.codes import INPUT_PROP_ACCELEROMETER
 
 SYS_INPUT = Path("/sys/class/input")
 WORD_BITS = 8 * struct.calcsize("l")

@@ -7,9 +7,9 @@ of today has, are the sign of that. Such a pad is taken only if its maker number
 
 from dataclasses import dataclass, field
 
-from lira.tools.joystick.codes import AXES, BUTTONS, control_names
-from lira.tools.joystick.mapping import Mapping, load_mapping
-from lira.tools.joystick.nodes import Node, is_any_pad
+from lira.tools.joystick.pads.codes import AXES, BUTTONS, control_names
+from lira.tools.joystick.pads.mapping import Mapping, load_mapping
+from lira.tools.joystick.pads.nodes import Node, is_any_pad
 
 SONY, EIGHTBITDO, LOGITECH = "054c", "2dc8", "046d"
 CHEAP = frozenset(("0079", "0810", "0e8f", "12bd"))  # DragonRise, Personal Communication Systems, GreenAsia, and such

@@ -11,4 +11,4 @@ REMEDY = (
 
 def rules_text() -> str:
     """The rule's file."""
-    return (resources.files("lira.tools.joystick") / "60-lira-pad.rules").read_text(encoding="utf-8")
+    return (resources.files("lira.tools.joystick.device") / "60-lira-pad.rules").read_text(encoding="utf-8")

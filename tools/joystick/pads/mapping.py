@@ -8,7 +8,7 @@ from msgspec import Meta
 
 from lira.hal.config import Table, load_toml
 from lira.hal.errors import ConfigError
-from lira.tools.joystick.codes import AXES, BUTTONS, axis_of, is_control
+from lira.tools.joystick.pads.codes import AXES, BUTTONS, axis_of, is_control
 
 Share = Annotated[float, Meta(ge=0.0, le=1.0)]
 
@@ -89,7 +89,7 @@ class Mapping(Table, frozen=True):
 
 def known_pads() -> list[str]:
     """Names of the mappings that come with the project."""
-    folder = resources.files("lira.tools.joystick") / "pads"
+    folder = resources.files("lira.tools.joystick.pads")
     return sorted(entry.name.removesuffix(".toml") for entry in folder.iterdir() if entry.name.endswith(".toml"))
 
 
@@ -102,5 +102,5 @@ def load_mapping(name_or_path: str) -> Mapping:
             f"unknown pad '{name_or_path}'",
             f"Known: {', '.join(known_pads())}; or write a file of your own with: lira joystick --learn my-pad.toml",
         )
-    with resources.as_file(resources.files("lira.tools.joystick") / "pads" / f"{name_or_path}.toml") as path:
+    with resources.as_file(resources.files("lira.tools.joystick.pads") / f"{name_or_path}.toml") as path:
         return load_toml(path, Mapping)

@@ -5,10 +5,10 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from lira.hal.errors import DeviceError
-from lira.tools.joystick.families import layout_of, missing, why_not
-from lira.tools.joystick.mapping import Mapping
-from lira.tools.joystick.nodes import Node, is_any_pad, motion_of, read_nodes
-from lira.tools.joystick.pad import Pad
+from lira.tools.joystick.device.pad import Pad
+from lira.tools.joystick.pads.families import layout_of, missing, why_not
+from lira.tools.joystick.pads.mapping import Mapping
+from lira.tools.joystick.pads.nodes import Node, is_any_pad, motion_of, read_nodes
 
 NONE_THERE = "no pad is there: plug one in, or press its PS button"
 TEACH = "Teach it: lira joystick --learn my-pad.toml --device {}"

@@ -5,12 +5,12 @@ from pathlib import Path
 
 from lira.hal.errors import DeviceError
 from lira.tools.joystick.axes import AxisRange, PadEvent, PadState
-from lira.tools.joystick.codes import EV_SYN, SYN_DROPPED, SYN_REPORT
-from lira.tools.joystick.event_device import FF_RUMBLE, EventDevice
-from lira.tools.joystick.mapping import Mapping
-from lira.tools.joystick.nodes import Node
-from lira.tools.joystick.rules import REMEDY
-from lira.tools.joystick.rumble_motor import Motor
+from lira.tools.joystick.device.event_device import FF_RUMBLE, EventDevice
+from lira.tools.joystick.device.rules import REMEDY
+from lira.tools.joystick.device.rumble_motor import Motor
+from lira.tools.joystick.pads.codes import EV_SYN, SYN_DROPPED, SYN_REPORT
+from lira.tools.joystick.pads.mapping import Mapping
+from lira.tools.joystick.pads.nodes import Node
 
 
 class Pad:

@@ -1,0 +1,1 @@
+"""A pad that is there: found, opened, read and made to rumble."""
