@@ -17,6 +17,7 @@ from pathlib import Path
 
 import pytest
 from hypothesis import settings
+from foreign import NO_FOXGLOVE, NO_ROS, NO_SDK
 from kinds import kind_of
 from loopback import take_own_loopback
 
@@ -33,6 +34,9 @@ EXPECTED_SKIPS = {
     "in lockstep silence stops time",
     "no package index answers",
     "no client of others is installed",
+    NO_ROS,
+    NO_SDK,
+    NO_FOXGLOVE,
 }
 OPEN = "lira/open"  # in pytest's cache: what failed in the crowd
 MOST_OPEN = 40

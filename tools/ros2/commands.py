@@ -1,5 +1,6 @@
 """What a ROS graph commands, passed on to the robot: velocities with and without a stamp, and the emergency stop."""
 
+import re
 import sys
 from dataclasses import replace
 from functools import partial
@@ -36,12 +37,12 @@ class Commands:
 
     def __init__(self, bus: Bus, node: RosNode, control: Control, salt: bytes, robot_time: RobotTime) -> None:
         commanders = Commanders(salt)
-        timeouts = {CMD_VEL: control.policy_timeout_s, TELEOP: control.teleop_timeout_s}
+        timeouts = (CMD_VEL, control.policy_timeout_s), (TELEOP, control.teleop_timeout_s)
         self._watch = CommandWatch()
         self._advised: set[str] = set()
         self._ways = [
             _Way(bus, node, topic, commanders, robot_time, partial(self._watch.note_ros, timeout_s=timeout_s))
-            for topic, timeout_s in timeouts.items()
+            for topic, timeout_s in timeouts
         ]
         self._estop = node.reader(ESTOP, DEPTH)
         self._press: Publisher[Bool] = bus.publisher(ESTOP)
@@ -56,9 +57,11 @@ class Commands:
 
     def advise(self, now_s: float, *, armed: bool) -> None:
         """Say, once each, why what is commanded does not drive: ROS has no word for it. `now_s` is monotonic."""
-        for advice in set(self._watch.advice(now_s, armed=armed)) - self._advised:
-            self._advised.add(advice)
-            print(advice, file=sys.stderr, flush=True)
+        for advice in self._watch.advice(now_s, armed=armed):
+            kind = re.sub(r"[0-9.]+", "", advice)  # whatever the numbers in it are by now
+            if kind not in self._advised:
+                print(advice, file=sys.stderr, flush=True)
+            self._advised.add(kind)
 
 
 class Note(Protocol):
