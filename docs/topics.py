@@ -4,7 +4,8 @@ from zenoh import Reliability
 
 from lira.hal.bus.topics import TOPICS, Qos, Topic
 from lira.hal.messages.codec import ros_type_of
-from lira.hal.messages.ros_types import TYPES
+from lira.hal.messages.ros_types import PACKAGE, TYPES
+from lira.hal.rmw.hashes import type_hash
 
 
 def topic_table() -> str:
@@ -14,11 +15,10 @@ def topic_table() -> str:
 
 
 def hash_table() -> str:
-    """Return one row for each type on the bus."""
-    types = sorted(
-        {topic.ros_type for topic in TOPICS} | {ros_type_of(topic.stamped) for topic in TOPICS if topic.stamped}
-    )
-    return "| type | RIHS01 |\n|---|---|\n" + "".join(f"| `{name}` | `{_hash(name)}` |\n" for name in types)
+    """Return one row for each type on the bus, and each of ours."""
+    types = {topic.ros_type for topic in TOPICS} | {ros_type_of(topic.stamped) for topic in TOPICS if topic.stamped}
+    types |= {name for name in TYPES.types if name.startswith(f"{PACKAGE}/")}
+    return "| type | RIHS01 |\n|---|---|\n" + "".join(f"| `{name}` | `{_hash(name)}` |\n" for name in sorted(types))
 
 
 def _row(topic: Topic[object]) -> str:
@@ -45,4 +45,4 @@ def _way(qos: Qos) -> str:
 
 
 def _hash(ros_type: str) -> str:
-    return TYPES.hash_rihs01(ros_type).removeprefix("RIHS01_")
+    return type_hash(ros_type).removeprefix("RIHS01_")

@@ -3,8 +3,6 @@
 import math
 from dataclasses import dataclass, replace
 
-import numpy as np
-
 from lira.hal.messages import STOP, CourseState, Odometry, Twist
 from lira.hal.profile import Base
 from lira.sim_backend import drive
@@ -31,12 +29,19 @@ class Verdict:
 
 
 class Body:
-    """One robot on one course. `time_s` is how far its motion has been worked out."""
+    """One robot on one course. `time_s` is how far its motion has been worked out.
+
+    Where the boxes are is looked up only when one might have been reached since, or somebody asks; `_free_m` is how far
+    at least the robot could go from where it is before it touches one.
+    """
 
     def __init__(self, base: Base, course: Course) -> None:
         self._base = base
         self.course = course
         self.time_s = 0.0
+        self._free_m = 0.0
+        self._touched = False  # since the referee looked last
+        self._judged, self._judged_s = False, 0.0  # whether that was now, and when
         self.put_down(0.0, 0.0, 0.0)
 
     def put_down(self, start_m: float, lateral_m: float, yaw_rad: float, began_m: float | None = None) -> None:
@@ -44,7 +49,7 @@ class Body:
         self.motion = drive.motion(*self.course.start_pose(start_m, lateral_m, yaw_rad))
         self.odometry = drive.motion(0.0, 0.0, 0.0)
         self.command(STOP)
-        self.verdict = Verdict(start_m if began_m is None else began_m, start_m, lateral_m, math.inf)
+        self._verdict = Verdict(start_m if began_m is None else began_m, start_m, lateral_m, math.inf)
         self._look()
 
     def place(self, state: CourseState) -> None:
@@ -53,7 +58,7 @@ class Body:
         self.odometry = drive.motion(0.0, 0.0, 0.0)
         self.command(Twist(state.linear_m_s, state.angular_rad_s))
         progress_m = self._progress_m(None if math.isnan(state.progress_m) else state.progress_m)
-        self.verdict = Verdict(progress_m, progress_m, 0.0, math.inf)
+        self._verdict = Verdict(progress_m, progress_m, 0.0, math.inf)
         self._look()
 
     def command(self, target: Twist) -> None:
@@ -65,7 +70,16 @@ class Body:
         """Work the motion out until `until_s`."""
         while (left_s := until_s - self.time_s) > ROUNDING_S:
             self._move(min(left_s, REFEREE_PERIOD_S))
+            if self.time_s - self._judged_s > REFEREE_PERIOD_S - ROUNDING_S:
+                self._judge()
         self.time_s = max(self.time_s, until_s)
+
+    @property
+    def verdict(self) -> Verdict:
+        """What the referee sees now."""
+        if not self._judged:
+            self._judge()
+        return self._verdict
 
     def state(self) -> CourseState:
         """Ground truth at `time_s`."""
@@ -98,31 +112,42 @@ class Body:
         )
 
     def _move(self, duration_s: float) -> None:
-        """Move in steps that cannot jump into a box, then let the referee look."""
+        """Move in steps that cannot jump into a box."""
         until_s = self.time_s + duration_s
-        touched = False
-        clearance_m = self.verdict.clearance_m
         while (left_s := until_s - self.time_s) > ROUNDING_S:
             speed_m_s = max(abs(float(self.motion.linear_m_s)), abs(self._target.linear_m_s))
             target, holds_s = self._obeyed()
             step_s = min(left_s, holds_s)
-            if speed_m_s * step_s >= clearance_m:
-                step_s = min(step_s, max(clearance_m / max(speed_m_s, STILL_M_S), TOUCH_PERIOD_S))
-            before = self.motion
-            after = drive.step(
-                self._base, before, np.asarray(target.linear_m_s), np.asarray(target.angular_rad_s), step_s
-            )
-            ahead_m = float(self.course.clearance(after.xy))
-            if ahead_m < 0.0 and ahead_m < clearance_m:
-                # A disc that touches can turn, and back away, but not go on.
-                touched = True
-                after = replace(after, x_m=before.x_m, y_m=before.y_m, linear_m_s=np.zeros(()))
-            else:
-                clearance_m = ahead_m
-            self.motion = after
-            self.odometry = drive.reckon(self._base, self.odometry, before, after, step_s)
-            self.time_s += step_s
-        self._judge(clearance_m, touched)
+            if speed_m_s * step_s >= self._free_m:
+                self._free_m = self._clearance_m()
+                if speed_m_s * step_s >= self._free_m:
+                    self._creep(target, speed_m_s, step_s)
+                    continue
+            self._step(target, step_s)
+            self._free_m -= speed_m_s * step_s
+        self._judged = False
+
+    def _creep(self, target: Twist, speed_m_s: float, step_s: float) -> None:
+        """Move as far as to the nearest box at most, or into it by a step that is small."""
+        before, clearance_m = self.motion, self._free_m
+        step_s = min(step_s, max(clearance_m / max(speed_m_s, STILL_M_S), TOUCH_PERIOD_S))
+        odometry = self.odometry
+        self._step(target, step_s)
+        ahead_m = self._clearance_m()
+        if ahead_m < 0.0 and ahead_m < clearance_m:
+            # A disc that touches can turn, and back away, but not go on.
+            self._touched = True
+            after = replace(self.motion, x_m=before.x_m, y_m=before.y_m, linear_m_s=drive.number(0.0))
+            self.motion, self.odometry = after, drive.reckon(self._base, odometry, before, after, step_s)
+        else:
+            self._free_m = ahead_m
+
+    def _step(self, target: Twist, step_s: float) -> None:
+        before = self.motion
+        goal = drive.number(target.linear_m_s), drive.number(target.angular_rad_s)
+        self.motion = drive.step(self._base, before, *goal, step_s)
+        self.odometry = drive.reckon(self._base, self.odometry, before, self.motion, step_s)
+        self.time_s += step_s
 
     def _obeyed(self) -> tuple[Twist, float]:
         """What the base drives at, and for how long: its firmware gives up on a commander that has gone silent."""
@@ -131,24 +156,30 @@ class Body:
         holds_s = self._commanded_s + drive.FIRMWARE_WATCHDOG_S - self.time_s
         return (self._target, holds_s) if holds_s > ROUNDING_S else (STOP, math.inf)
 
+    def _clearance_m(self) -> float:
+        return self.course.clearance_one(float(self.motion.x_m), float(self.motion.y_m))
+
     def _look(self) -> None:
         """First verdict of an episode. Who is put down into a box has collided."""
-        clearance_m = float(self.course.clearance(self.motion.xy))
-        self._judge(clearance_m, touched=clearance_m < 0.0)
+        self._touched = self._clearance_m() < 0.0
+        self._judge()
 
     def _progress_m(self, hint_m: float | None) -> float:
         return float(self.course.place(self.motion.xy, self.motion.yaw_rad, hint_m).progress_m)
 
-    def _judge(self, clearance_m: float, touched: bool) -> None:
-        course, was = self.course, self.verdict
+    def _judge(self) -> None:
+        """Let the referee look."""
+        course, was = self.course, self._verdict
         curve = course.layout.curve
         progress_m, lateral_m = curve.project_one(float(self.motion.x_m), float(self.motion.y_m), was.progress_m)
-        self.verdict = Verdict(
+        clearance_m = self._free_m = self._clearance_m()
+        self._verdict = Verdict(
             began_m=was.began_m,
             progress_m=progress_m,
             lateral_m=lateral_m,
             clearance_m=clearance_m,
-            collided=was.collided or touched,
+            collided=was.collided or self._touched,
             lost=was.lost or course.lost(lateral_m, clearance_m),
             finished=was.finished or course.finished(progress_m, was.began_m),
         )
+        self._judged, self._judged_s, self._touched = True, self.time_s, False

@@ -60,6 +60,16 @@ class Obstacles:
         nearest: Floats = (outside + np.minimum(np.maximum(along, across), 0.0)).min(-1)
         return nearest
 
+    def distance_one(self, x_m: float, y_m: float) -> float:
+        """Distance of one place: the same to the bit as `distance`, and sooner."""
+        if not len(self.x_m):
+            return math.inf
+        off_x, off_y = x_m - self.x_m, y_m - self.y_m
+        along = np.abs(self.cos * off_x + self.sin * off_y) - self.half_length_m
+        across = np.abs(self.cos * off_y - self.sin * off_x) - self.half_width_m
+        outside = np.hypot(np.maximum(along, 0.0), np.maximum(across, 0.0))
+        return float((outside + np.minimum(np.maximum(along, across), 0.0)).min())
+
 
 class Course:
     """A layout as a robot of radius `radius_m` (the half diagonal of its footprint) meets it."""
@@ -74,6 +84,10 @@ class Course:
     def clearance(self, xy: Floats) -> Floats:
         """Metres between the robot's disc at each of `xy` [..., 2] and the nearest box; below 0 it is inside."""
         return self.obstacles.distance(xy) - self.radius_m
+
+    def clearance_one(self, x_m: float, y_m: float) -> float:
+        """Clearance at one place: the same to the bit as `clearance`, and sooner."""
+        return self.obstacles.distance_one(x_m, y_m) - self.radius_m
 
     def place(self, xy: Floats, yaw_rad: Floats, hint_m: Floats | float | None = None) -> Place:
         """Project poses, xy [..., 2] and yaw [...], near the progress `hint_m` (see `Polyline.project`)."""

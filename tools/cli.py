@@ -33,6 +33,8 @@ EXTRAS = {
     "mcap": "record",
     "zstandard": "record",
     "foxglove": "view",
+    "h5py": "export",
+    "pyarrow": "export",
     "prometheus_client": "view",
 }
 

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from torch import Tensor, nn
 
 from lira.fusion.inference.architecture import Weights
+from lira.fusion.learning.adam import Adam
 from lira.fusion.learning.heads import Heads
 from lira.fusion.learning.label_store import FileRows, Rows
 from lira.fusion.learning.labels import Label as Label
@@ -119,10 +120,9 @@ class Learner:
         return [each for trunk in trunks for each in trunk.parameters() if each.requires_grad]
 
     @cached_property
-    def _adam(self) -> torch.optim.Adam:
-        """PyTorch's optimisers load for seconds and take 80 MB."""
+    def _adam(self) -> Adam:
         heads = [self._heads.flat, *([self._doubters.flat] if self._members else [])]
-        return torch.optim.Adam([*heads, *self._trunks], lr=self._learning_rate, fused=True)
+        return Adam([*heads, *self._trunks], self._learning_rate)
 
     def _keep(self, label: Label) -> None:
         kept = {name: MODALITIES[name].keep(label.features[name]) for name in self._network.shapes}

@@ -121,6 +121,23 @@ def test_time_is_worked_out_alike_in_long_and_short_advances():
         assert (a.x_m, a.y_m, a.yaw_rad, a.progress_m) == pytest.approx((b.x_m, b.y_m, b.yaw_rad, b.progress_m))
 
 
+def test_who_asks_often_and_who_asks_once_are_told_the_same():
+    """Between two looks of the referee nothing is worked out but the motion."""
+    for start_m in np.arange(0.0, 30.0, 1.1).tolist():
+        asked, left = body(KINEMATIC, "line-obstacles"), body(KINEMATIC, "line-obstacles")
+        for each in (asked, left):
+            each.put_down(start_m, 0.1, 0.3)
+            each.command(Twist(1.0, -0.4))
+        for tick in range(1, 25):
+            asked.advance(tick * 0.05)
+            left.advance(tick * 0.05)
+            asked.state()
+        one, other = asked.state(), left.state()
+        assert (one.x_m, one.y_m, one.yaw_rad, one.collided) == (other.x_m, other.y_m, other.yaw_rad, other.collided)
+        assert (one.clearance_m, one.lateral_m) == (other.clearance_m, other.lateral_m)
+        assert one.clearance_m == asked.course.clearance(asked.motion.xy)
+
+
 def test_a_box_blocks_and_the_collision_latches():
     robot = body(KINEMATIC, "forest")  # a box of 0.45 m stands 4 m ahead
     robot.command(Twist(1.0, 0.0))

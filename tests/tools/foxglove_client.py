@@ -22,7 +22,7 @@ class Shown:
 
 
 class FoxgloveClient:
-    """What `connect` gives: the server's information, its channels by topic, and what was subscribed to."""
+    """What `connect` gives: the server's words, its channels by topic below the robot's name, and subscriptions."""
 
     def __init__(self, socket):
         self.socket = socket
@@ -72,7 +72,7 @@ class FoxgloveClient:
         if words["op"] == "serverInfo":
             self.info = words
         elif words["op"] == "advertise":
-            self.channels |= {channel["topic"]: channel for channel in words["channels"]}
+            self.channels |= {f"/{each['topic'].split('/', 2)[2]}": each for each in words["channels"]}
 
     def _shown(self, data):
         number, time_ns = struct.unpack_from("<IQ", data, 1)

@@ -9,11 +9,28 @@ from lira.hal.bus.topics import TOPICS
 from lira.hal.messages import Reason
 from lira.hal.messages.ros_types import TYPES
 from lira.tools.cli import main
-from lira.tools.view.layout import load_layout, topics_and_paths
+from lira.tools.view.layout import layout_text
 
-TYPES_BY_TOPIC = {f"/{topic.key}": topic.ros_type for topic in TOPICS}
+TYPES_BY_TOPIC = {f"/rosbot/{topic.key}": topic.ros_type for topic in TOPICS}
 SCALAR, NAMED, ARRAY, SEQUENCE = 1, 2, 3, 4  # kinds of a field in a rosbags typestore
-TO_COME = {"/robot_description", "/camera/color/camera_info"}
+
+
+def load_layout():
+    return json.loads(layout_text("rosbot"))
+
+
+def topics_and_paths(layout):
+    """Which topics it shows, and which paths into messages it plots."""
+    topics, paths = set(), set()
+    for panel in layout["configById"].values():
+        topics |= set(panel.get("topics", {}))
+        image = panel.get("imageMode", {})
+        topics |= {image[key] for key in ("imageTopic", "calibrationTopic") if key in image}
+        topics |= {panel[key] for key in ("topicPath", "topicToRender") if key in panel}
+        topics |= {layer["topic"] for layer in panel.get("layers", {}).values() if "topic" in layer}
+        paths |= {line["value"] for line in panel.get("paths", [])}
+        paths |= {panel["path"]} if "path" in panel else set()
+    return topics, paths
 
 
 def field_of(ros_type, path):
@@ -40,8 +57,8 @@ def leads_nowhere(path):
 
 def test_every_topic_of_the_layout_is_on_the_bus():
     topics, _ = topics_and_paths(load_layout())
-    assert {"/scan", "/camera/color/image_raw/compressed"} <= topics
-    assert topics - TO_COME <= TYPES_BY_TOPIC.keys()
+    assert {"/rosbot/scan", "/rosbot/camera/color/camera_info", "/rosbot/robot_description"} <= topics
+    assert topics <= TYPES_BY_TOPIC.keys()
 
 
 def test_every_path_of_the_layout_leads_to_a_value():
@@ -51,7 +68,14 @@ def test_every_path_of_the_layout_leads_to_a_value():
 
 
 @pytest.mark.parametrize(
-    "path", ["/odom.twist.twist.linear.w", "/nothing.x", "/lira/decision.experts[0]", "/odom.pose"]
+    "path",
+    [
+        "/rosbot/odom.twist.twist.linear.w",
+        "/rosbot/nothing.x",
+        "/odom.twist.twist.linear.x",
+        "/rosbot/lira/decision.experts[0]",
+        "/rosbot/odom.pose",
+    ],
 )
 def test_a_path_that_leads_nowhere_would_be_noticed(path):
     assert leads_nowhere(path)
@@ -74,5 +98,14 @@ def test_the_light_of_the_layout_has_a_colour_for_every_reason():
 def test_the_layout_is_written_where_it_is_asked_for(tmp_path, capsys):
     assert main(["view", "--layout", str(tmp_path / "lira.json")]) == 0
     assert json.loads((tmp_path / "lira.json").read_text()) == load_layout()
+
+
+def test_a_robot_of_another_name_has_a_layout_of_its_own(tmp_path):
+    assert main(["view", "--name", "r2", "--layout", str(tmp_path / "lira.json")]) == 0
+    topics, paths = topics_and_paths(json.loads((tmp_path / "lira.json").read_text()))
+    assert all(each.startswith("/r2/") for each in topics | paths)
+
+
+def test_a_layout_that_cannot_be_written_is_told(tmp_path, capsys):
     assert main(["view", "--layout", str(tmp_path / "missing" / "lira.json")]) == 2
     assert "Choose another folder" in capsys.readouterr().err

@@ -12,8 +12,9 @@ from lira.fusion.operator_service import Job
 from lira.hal.errors import ConfigError
 from lira.hal.profile import RobotProfile
 from lira.tools.output.proven import contradiction_words
-
-LABELS, RECORD, NOVICE = "labels.lira", "run.jsonl", "novice.safetensors"
+from lira.tools.runs.names import LABELS as LABELS
+from lira.tools.runs.names import NOVICE as NOVICE
+from lira.tools.runs.names import RECORD as RECORD
 
 
 def check_fresh(folder: Path) -> None:

@@ -4,6 +4,7 @@ A verb's module has `add_arguments(parser)` and `run(args) -> exit status`. Its 
 it does, then examples. Heavy imports belong inside `run`.
 """
 
+from keyword import iskeyword
 from typing import NamedTuple
 
 
@@ -26,6 +27,7 @@ GROUPS = {
         "twin": "the digital twin: a simulated ROSbot on the bus",
         "robot": "the physical ROSbot: opens its lidar, camera and base, and puts it on the bus",
         "ros2": "a robot that runs ROS 2: puts it on the bus through zenoh-bridge-ros2dds",
+        "msgs": "write the ROS 2 package with our message types, for colcon build",
         "calibrate": "measure how far the base really goes, and write it into its settings",
         "parity": "the same motions on two robots, and where they differ",
     },
@@ -47,6 +49,8 @@ GROUPS = {
         "record": "record everything on a robot's bus, for later and for others' tools",
         "info": "what a recording holds",
         "rerun": "put a recorded run through its method again: the same, or what would have been otherwise",
+        "export": "a recorded run as a data set: LeRobot, robomimic, CSV",
+        "import": "a LeRobot data set or a bag as demonstrations, to start from",
         "report": "make the HTML page of a recorded run",
     },
     ("operation", "Operation"): {
@@ -66,7 +70,8 @@ GROUPS = {
 
 def module_of(folder: str, verb: str) -> str:
     """Return the full name of a verb's module."""
-    return f"{__name__}.{folder}.{verb.replace('-', '_')}"
+    name = f"{verb}_" if iskeyword(verb) else verb.replace("-", "_")
+    return f"{__name__}.{folder}.{name}"
 
 
 VERBS = {

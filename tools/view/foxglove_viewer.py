@@ -29,7 +29,7 @@ class FoxgloveViewer:
     def __init__(self, robot: str, topics: Sequence[Topic[Any]], host: str = "127.0.0.1", port: int = 8765) -> None:
         logging.getLogger("foxglove").setLevel(logging.CRITICAL)  # what a client does wrong is no news
         self._context = foxglove.Context()
-        self._channels = {topic.key: _channel(topic, self._context) for topic in topics}
+        self._channels = {topic.key: _channel(f"/{robot}/{topic.key}", topic, self._context) for topic in topics}
         self._latched: dict[str, Sample | None] = {topic.key: None for topic in topics if topic.qos.latched}
         self._late = _LateSubscribers(self._channels)
         try:
@@ -99,7 +99,7 @@ class _LateSubscribers(ServerListener):
         return new
 
 
-def _channel(topic: Topic[Any], context: foxglove.Context) -> foxglove.Channel:
+def _channel(name: str, topic: Topic[Any], context: foxglove.Context) -> foxglove.Channel:
     text = definition(topic.ros_type).encode()
     schema = foxglove.Schema(name=topic.ros_type, encoding="ros2msg", data=text)
-    return foxglove.Channel(f"/{topic.key}", schema=schema, message_encoding="cdr", context=context)
+    return foxglove.Channel(name, schema=schema, message_encoding="cdr", context=context)

@@ -7,6 +7,7 @@ import torch
 from torch import Tensor, nn
 from torch.nn.functional import adaptive_avg_pool2d, binary_cross_entropy_with_logits
 
+from lira.fusion.learning.adam import Adam
 from lira.fusion.policies.networks import initialise
 from lira.fusion.preprocess import Features
 from lira.hal.messages import Action
@@ -43,7 +44,7 @@ class Probe:
         x = torch.stack([inputs for inputs, _ in self._examples])
         y = torch.tensor([target for _, target in self._examples])
         self._network = self._network or _network(x.shape[1], self._seed)
-        optimiser = torch.optim.Adam(self._network.parameters(), lr=RATE, fused=True)
+        optimiser = Adam(list(self._network.parameters()), RATE)
         pools = [pool for pool in (torch.nonzero(y > FEW)[:, 0], torch.nonzero(y <= FEW)[:, 0]) if len(pool)]
         for _ in range(STEPS):
             picks = torch.cat([pool[self._random.integers(len(pool), size=BATCH // len(pools))] for pool in pools])

@@ -32,7 +32,7 @@ def run(args: argparse.Namespace) -> int:
     if args.layout is not None:
         from lira.tools.view.layout import save_layout
 
-        save_layout(args.layout)
+        save_layout(args.layout, args.name)
         print(f"written: {args.layout}; in Foxglove choose Layout, Import from file")
         return 0
 

@@ -1,0 +1,93 @@
+"""A run that was recorded over the bus, exported: what a learner saw and kept stands in the data set, to the bit."""
+
+import contextlib
+import signal
+import uuid
+
+import numpy as np
+import pyarrow.parquet as pq
+import pytest
+
+from lira.fusion.log.label_log import read_demonstrations
+from lira.fusion.modalities.image import gray_image
+from lira.hal.messages import Image
+from lira.tools.cli import main
+from lira.tools.export.columns import SCAN
+from lira.tools.export.pictures import pictures_of, size_of
+from lira.tools.export.run import load_run
+from lira.tools.launch.processes import ChildProcess, free_port, lira_command
+
+WORLD = """
+description = "A short straight line with one box on it"
+
+[line]
+pieces = [{ straight_m = 18.0 }]
+
+[[box]]
+x_m = 6.0
+y_m = 0.0
+
+[limits]
+finish_m = 12.0
+lost_m = 1.5
+"""
+RUN_S = 120.0
+
+
+@pytest.fixture(scope="module")
+def run(tmp_path_factory):
+    """Folder of a run of one lap, recorded by `lira record`."""
+    folder = tmp_path_factory.mktemp("export")
+    (folder / "short.toml").write_text(WORLD)
+    endpoint = f"127.0.0.1:{free_port()}"
+    robot = ["--name", f"x{uuid.uuid4().hex}"]
+    at = [*robot, "--connect", endpoint]
+
+    def start(stack, ready, verb, *words):
+        child = ChildProcess(verb, lira_command(verb, *words), folder / f"{verb}.log")
+        stack.enter_context(child).wait_ready(ready, 60.0)
+        return child
+
+    with contextlib.ExitStack() as stack:
+        world = ["--world", str(folder / "short.toml"), "--renderer", "sketch", "--lockstep", "--listen", endpoint]
+        start(stack, "serves world", "twin", *robot, *world)
+        recorder = start(stack, "records", "record", *at, "--out", str(folder / "run/recording"))
+        teach = ["--method", "hold", "--teacher", "scripted", "--train-laps", "1", "--run", str(folder / "run")]
+        fusion = ChildProcess("fusion", lira_command("fusion", *at, *teach), folder / "fusion.log")
+        with fusion:
+            assert fusion.wait(RUN_S) in (0, 1), fusion.output()
+        recorder.signal(signal.SIGINT)
+        assert recorder.wait(20.0) == 0, recorder.output()
+    return folder / "run"
+
+
+def test_what_the_learner_saw_is_in_the_data_set(run):
+    found = load_run(run)
+    labels = {(each.observation, each.source, each.novice): each for each in read_demonstrations(found.labels)}
+    assert len(labels) > 20
+    met = 0
+    for table in found.tables:
+        steps = table.episode.steps
+        for number, (step, picture) in enumerate(zip(steps, pictures_of(steps, size_of(steps)), strict=True)):
+            decision = step.decision
+            label = labels.get((decision.observation, decision.driver, decision.novice))
+            if label is None:
+                assert not step.in_buffer
+                continue
+            met += 1
+            assert step.in_buffer == label.stored
+            assert (table[SCAN].values[number] == label.features.scan).all()
+            assert (gray_image(Image(0.0, picture), label.features.image.shape[0]) == label.features.image).all()
+    assert met > 0.95 * len(labels)  # decisions travel by a topic that may lose some
+
+
+def test_the_data_set_goes_out_and_comes_back(run, tmp_path, capsys):
+    assert main(["export", "lerobot", str(run), str(tmp_path / "set")]) == 0
+    rows = pq.read_table(tmp_path / "set/data/chunk-000/file-000.parquet")
+    kept = int(np.sum(rows["in_buffer"].to_pylist()))
+    assert 0 < kept < len(rows)
+    assert main(["import", str(tmp_path / "set"), "--run", str(tmp_path / "warm"), "--frames", "buffer"]) == 0
+    assert f"{kept} demonstrations" in capsys.readouterr().out
+    before = sorted(each.action for each in read_demonstrations(run / "labels.lira") if each.stored)
+    after = sorted(each.action for each in read_demonstrations(tmp_path / "warm/labels.lira"))
+    assert len(before) - len(after) <= 0.05 * len(before)

@@ -1,0 +1,66 @@
+"""Write a recorded run as a data set of others: each decision with what was sensed, who drove, and what all proposed.
+
+lerobot: a LeRobotDataset v3.0 (parquet, MP4, JSON). robomimic: one HDF5 file. csv: a line a step, without pictures.
+Laps are episodes, whole, whoever drove: `intervention` and `source` say who, `in_buffer` what the learner kept. The log
+of labels is found beside the recording; without one the recording's counts tell what was kept.
+
+examples:
+  lira export lerobot runs/mine datasets/mine
+  lira export robomimic runs/mine mine.hdf5
+  lira export csv recordings/20261127-120000 mine.csv
+"""
+
+import argparse
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from lira.tools.export.run import RecordedRun
+
+FORMATS = ("lerobot", "robomimic", "csv")
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the arguments."""
+    add = parser.add_argument
+    add("format", choices=FORMATS)
+    add("file", type=Path, metavar="FILE", help="an .mcap file, the folder of a recording, or of a run")
+    add(
+        "out",
+        type=Path,
+        metavar="OUT",
+        help="what to write: a folder for lerobot, else a file; nothing is written over",
+    )
+    add("--labels", type=Path, metavar="FILE", help="log of the run's labels (default: labels.lira beside it)")
+    add("--task", metavar="WORDS", help="what was taught, in words (default: drive in <world>)")
+
+
+def run(args: argparse.Namespace) -> int:
+    """Read the run and write it."""
+    from lira.tools.export.run import load_run
+
+    found = load_run(args.file, args.labels)
+    write(args, found)
+    count = sum(map(len, found.tables))
+    kept = sum(int(table["in_buffer"].values.sum()) for table in found.tables)
+    by = f"by {found.labels}" if found.labels else "by the recording's counts"
+    print(f"written: {args.out}: {len(found.tables)} episodes, {count} steps; {kept} are in the buffer, {by}")
+    return 0
+
+
+def write(args: argparse.Namespace, found: "RecordedRun") -> None:
+    """Write the format that was asked for."""
+    robot, world = found.head.info.profile.name, found.head.world
+    if args.format == "csv":
+        from lira.tools.export.csv_file import write_csv
+
+        write_csv(found.tables, args.out)
+    elif args.format == "robomimic":
+        from lira.tools.export.robomimic import write_robomimic
+
+        write_robomimic(found.tables, args.out, {"robot": robot, "world": world})
+    else:
+        from lira.tools.export.lerobot import write_lerobot
+
+        task = args.task or (f"drive in {world}" if world else "drive")
+        write_lerobot(found.tables, args.out, robot=robot, task=task, fps=found.fps)
