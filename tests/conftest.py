@@ -16,8 +16,8 @@ from collections.abc import Generator, Iterator
 from pathlib import Path
 
 import pytest
-from hypothesis import settings
 from foreign import NO_FOXGLOVE, NO_ROS, NO_SDK
+from hypothesis import settings
 from kinds import kind_of
 from loopback import take_own_loopback
 

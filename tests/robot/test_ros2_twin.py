@@ -46,10 +46,11 @@ def test_a_peer_that_nobody_here_wrote_lists_it_hears_it_and_drives_it(tmp_path)
     assert met["scan"][1] > 50
     assert ["odom", "base_link"] in met["tf"]
     assert bytes.fromhex(met["picture"][1]) in (b"\xff\xd8\xff", b"\x89PN")
-    assert met["odom"][0] == pytest.approx(0.2, abs=0.05)
-    assert met["odom"][1] > 0.2
+    assert met["fastest"] == pytest.approx(0.2, abs=0.05)
+    assert met["odom"] > 0.1
     assert 0.0 <= min(met["clock"]) < 0.3  # stamps are of now, in Unix time
-    assert met["press"] == [True, "emergency"]
+    assert met["press"][0]
+    assert met["press"][1].startswith("emergency")
 
 
 def test_what_offers_it_may_be_killed_and_the_robot_stands_and_goes_on(tmp_path):

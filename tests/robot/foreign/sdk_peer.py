@@ -25,6 +25,7 @@ found = {
     "scan_info": vars(discovery.get_topic_info("/scan", verbose=True, **AT).publishers[0]),
     "came": {},
     "clock": [],
+    "fastest": 0.0,
 }
 newest = {}
 
@@ -33,6 +34,8 @@ def listener(name):
     def hear(message):
         found["came"][name] = found["came"].get(name, 0) + 1
         newest[name] = message
+        if name == "/odom":
+            found["fastest"] = max(found["fastest"], message.twist.twist.linear.x)
         if name == "/scan":
             stamp = message.header.stamp
             found["clock"].append(time.time() - stamp.sec - stamp.nanosec / 1e9)
@@ -93,10 +96,12 @@ press = sdk.ROS2ServiceClient(
     type_hash=discovery.get_service_info("/estop/press", verbose=True, **AT).servers[0].type_hash,
     **AT,
 )
-answer = press.call()
+tries_s = time.monotonic() + 30.0
+while ((answer := press.call()) is None or not answer.success) and time.monotonic() < tries_s:
+    time.sleep(0.5)
 found["press"] = None if answer is None else [answer.success, answer.message]
 found["scan"] = None if scan is None else [scan.header.frame_id, len(scan.ranges), float(scan.angle_increment)]
-found["odom"] = None if odom is None else [odom.twist.twist.linear.x, odom.pose.pose.position.x]
+found["odom"] = None if odom is None else odom.pose.pose.position.x
 found["picture"] = None if picture is None else [picture.format, bytes(picture.data[:3]).hex()]
 found["tf"] = (
     [[each.header.frame_id, each.child_frame_id] for each in newest["/tf"].transforms] if "/tf" in newest else None
