@@ -78,7 +78,7 @@ class Offered:
 @contextmanager
 def offered():
     graph_at, stop = new_endpoint(), threading.Event()
-    with served(real_time_null(), world=b"{}") as robot, joined(robot) as bus, joined(robot) as watcher:
+    with served(real_time_null(), arena_info=b"{}") as robot, joined(robot) as bus, joined(robot) as watcher:
         node = RosNode(robot.name, listen=graph_at)
         offer = Offer(bus, node)
         thread = threading.Thread(target=offer.run, args=(stop,))

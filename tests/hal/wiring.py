@@ -49,14 +49,9 @@ class StuckRobot(NullRobot):
 
 
 class Served:
-    """A robot that is served from a thread; `failure` is what the server ended with.
+    """A robot that is served from a thread; `failure` is what the server ended with. On a `floor` it has no arena."""
 
-    On a `floor` it has no arena; `world` is what it says about its arena otherwise, as JSON.
-    """
-
-    def __init__(
-        self, inner: NullRobot, *, lockstep: bool = False, floor: bool = False, world: bytes = b"null"
-    ) -> None:
+    def __init__(self, inner: NullRobot, *, lockstep: bool = False, floor: bool = False, **more) -> None:
         self.inner = inner
         self.name, self.endpoint = new_name(), new_endpoint()
         self.stop, self.is_ready = threading.Event(), threading.Event()
@@ -64,9 +59,7 @@ class Served:
         self.governed = GovernedRobot(inner)
         self._bus = Bus(self.name, listen=self.endpoint)
         arena = None if floor else inner
-        self._server = HalServer(
-            self.governed, self._bus, arena, arena_info=world, lockstep=lockstep, ready=self.is_ready.set
-        )
+        self._server = HalServer(self.governed, self._bus, arena, lockstep=lockstep, ready=self.is_ready.set, **more)
         self._thread = threading.Thread(target=self._run)
         self._thread.start()
 
@@ -87,10 +80,8 @@ class Served:
 
 
 @contextmanager
-def served(
-    inner: NullRobot, *, lockstep: bool = False, floor: bool = False, world: bytes = b"null"
-) -> Iterator[Served]:
-    robot = Served(inner, lockstep=lockstep, floor=floor, world=world)
+def served(inner: NullRobot, *, lockstep: bool = False, floor: bool = False, **more) -> Iterator[Served]:
+    robot = Served(inner, lockstep=lockstep, floor=floor, **more)
     try:
         wait_for(lambda: robot.is_ready.is_set() or robot.failure is not None, 10.0)
         yield robot
