@@ -16,6 +16,7 @@ BENCHES = {
     "lockstep": "twin and learner in two processes over the bus in lockstep: times real time",
     "latency": "from a capture to the applied command through the whole stack, beside a bare zenoh echo",
     "takeover": "from pressing the dead-man to the applied command, while a policy drives",
+    "web": "the page: what a browser fetches, how soon it sees a picture, what three of them cost",
     "decide": "a decision of three networks, beside the same networks in PyTorch",
     "train": "one training step, beside a plain PyTorch loop, and what it does to the control loop",
     "drivers": "what the drivers need of a core, how old a published scan is, what the lidar's line loses in --minutes",

@@ -48,6 +48,7 @@ GROUPS = {
     ("records", "Records"): {
         "record": "record everything on a robot's bus, for later and for others' tools",
         "info": "what a recording holds",
+        "explain": "why the robot did what it did: of a recording, or now",
         "rerun": "put a recorded run through its method again: the same, or what would have been otherwise",
         "export": "a recorded run as a data set: LeRobot, robomimic, CSV",
         "import": "a LeRobot data set or a bag as demonstrations, to start from",
@@ -58,6 +59,7 @@ GROUPS = {
         "status": "what is up: processes, rates, ages, link, who drives",
         "logs": "what the processes that are up have written",
         "down": "stop all that is up, drivers first and the robot last",
+        "deploy": "run them from the start of the machine: systemd units, keys and rules, here or on the robot",
         "keys": "make the keys that say who may drive a robot, and encrypt the bus",
     },
     ("checks", "Checks"): {
