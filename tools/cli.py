@@ -36,6 +36,7 @@ EXTRAS = {
     "h5py": "export",
     "pyarrow": "export",
     "prometheus_client": "view",
+    "onnx": "onnx",
 }
 
 EXIT_ERROR = 2
