@@ -51,6 +51,7 @@ class Moment:
     moved: Recorded | None = None
     result: Recorded | None = None
     live: bool = False
+    methods: int = 0  # that had begun by then
 
     def message(self, topic: Topic[Any]) -> Any:
         """The newest of a topic, None if there was none."""
@@ -169,6 +170,7 @@ def _learn_of(moment: Moment, calls: Iterable[MethodCall]) -> None:
             break
         if call.name is CallName.BEGIN:
             of_this, moment.recipe = [], recipe_of(call)
+            moment.methods += 1
         of_this.append(call)
         if call.target == 0 and call.outcome and call.name in CALLS:
             moment.novice = outcome_of(call, OUTCOMES[call.name])
