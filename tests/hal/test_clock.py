@@ -138,3 +138,12 @@ def test_a_robot_that_was_silent_and_has_another_session_was_started_anew():
     assert not clock.hear(2, 1.0, 10.0 + SILENT_S - 0.01)
     assert clock.hear(2, 1.0, 10.0 + SILENT_S)
     assert clock.now(10.0 + SILENT_S) == 1.0
+
+
+def test_for_who_lets_commands_expire_by_it_time_never_slows_down():
+    """Delays that grow and then nothing: a governor that goes by an estimate of 0 would let no command expire."""
+    clock = ClockEstimate(even=True)
+    for step in range(100):
+        clock.note(100.0 + 0.02 * step, 0.02 * step + 0.018 * step)  # hardly any of it comes on time
+    before_s = clock.now(3.8)
+    assert clock.now(4.3) == pytest.approx(before_s + 0.5)
