@@ -10,6 +10,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 from rooms import code_map
+from ros2_tables import frame_table, heard_table, said_table, service_table
 from topics import hash_table, topic_table
 
 ROOT = Path(__file__).parent.parent
@@ -17,6 +18,10 @@ GENERATED: dict[tuple[str, str], Callable[[], str]] = {
     ("README.md", "map"): code_map,
     ("docs/bus.md", "topics"): topic_table,
     ("docs/bus.md", "hashes"): hash_table,
+    ("docs/ros2-interface.md", "said"): said_table,
+    ("docs/ros2-interface.md", "heard"): heard_table,
+    ("docs/ros2-interface.md", "services"): service_table,
+    ("docs/ros2-interface.md", "frames"): frame_table,
 }
 
 

@@ -8,6 +8,9 @@ from typing import Annotated
 from msgspec import Meta
 
 from lira.hal.config import Table, load_toml, parse_toml, read_bounded, write_whole
+from lira.hal.description.camera_info import load_calibration
+from lira.hal.messages import CameraInfo
+from lira.hal.profile import Camera
 
 Scale = Annotated[float, Meta(gt=0.5, lt=2.0)]
 Seconds = Annotated[float, Meta(ge=0.0, le=10.0)]
@@ -42,9 +45,13 @@ class BaseSettings(Table, frozen=True):
 
 
 class CameraSettings(Table, frozen=True):
-    """The camera. `depth`: grab its depth, too, though the profile has none; only OpenNI2 cameras have any."""
+    """The camera. `depth`: grab its depth, too, though the profile has none; only OpenNI2 cameras have any.
+
+    `calibration` is a file that ROS's camera_calibration wrote, found from the folder of the settings; "" for none.
+    """
 
     depth: bool = False
+    calibration: str = ""
 
 
 class Settings(Table, frozen=True):
@@ -58,6 +65,12 @@ class Settings(Table, frozen=True):
 def load_settings(path: Path | None) -> Settings:
     """Read a file of settings; without one everything is as delivered. Raises `ConfigError`."""
     return Settings() if path is None else load_toml(path, Settings)
+
+
+def load_camera_info(path: Path | None, camera: Camera) -> CameraInfo | None:
+    """Read the calibration that a file of settings names, None without one. Raises `ConfigError`."""
+    name = load_settings(path).camera.calibration
+    return load_calibration(path.parent / name, camera) if path is not None and name else None
 
 
 def write_base_setting(path: Path, key: str, value: float) -> None:

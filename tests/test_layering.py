@@ -27,7 +27,7 @@ ROOMS = {
         "profile": {"errors", "config", "messages"},
         "port": {"messages", "profile"},
         "bus": {"errors", "clock", "messages", "rmw", "profile"},
-        "description": {"errors", "messages", "profile"},
+        "description": {"errors", "config", "messages", "profile"},
         "ros_graph": {"errors", "messages", "rmw", "bus"},
         "safety": {"clock", "messages", "profile", "port"},
         "server": {"errors", "clock", "messages", "profile", "port", "bus", "description", "safety"},

@@ -35,6 +35,7 @@ EXTRAS = {
     "foxglove": "view",
     "h5py": "export",
     "pyarrow": "export",
+    "rerun": "rerun",
     "prometheus_client": "view",
 }
 

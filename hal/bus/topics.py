@@ -105,7 +105,7 @@ RANGES = {
     for frame_id in ("range_fl", "range_fr", "range_rl", "range_rr")
 }
 BATTERY = Topic("battery", BatteryState, 1.0, 5.0, LATCHED)
-TF = Topic("tf", Transforms, 20.0, 0.3, URGENT)  # with each odometry
+TF = Topic("tf", Transforms, 20.0, 0.3, REPORT)  # with each odometry; reliable, as ROS's listeners ask for
 TF_STATIC = Topic("tf_static", Transforms, 0.0, float("inf"), LATCHED, REPORT_BYTES)
 DESCRIPTION = Topic("robot_description", Text, 0.0, float("inf"), LATCHED, REPORT_BYTES)
 CAMERA_INFO = Topic("camera/color/camera_info", CameraInfo, 30.0, 0.3, REPORT)  # with each picture

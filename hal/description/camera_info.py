@@ -11,6 +11,7 @@ from typing import Any
 from ruamel.yaml import YAML
 from ruamel.yaml.error import YAMLError
 
+from lira.hal.config import read_bounded
 from lira.hal.errors import ConfigError
 from lira.hal.messages import CameraInfo
 from lira.hal.profile import Camera
@@ -53,14 +54,9 @@ def _resized(matrix: tuple[float, ...], columns: int, scales: tuple[float, float
 def load_calibration(path: Path, camera: Camera) -> CameraInfo:
     """Read a calibration, for pictures of the profile's size. Raises `ConfigError`."""
     try:
-        with path.open("rb") as file:
-            said = YAML(typ="safe", pure=True).load(file.read(LONGEST_BYTES))
+        said = YAML(typ="safe", pure=True).load(read_bounded(path, LONGEST_BYTES))
         return info_for(_read(said), (camera.width_px, camera.height_px), 0.0)
-    except OSError as error:
-        raise ConfigError(
-            f"cannot read {path}: {error.strerror}", "Give the file of a camera's calibration."
-        ) from error
-    except (YAMLError, KeyError, TypeError, ValueError, OverflowError) as error:
+    except (YAMLError, RecursionError, KeyError, TypeError, ValueError, OverflowError) as error:
         what = f"{path} is no camera calibration: {' '.join(str(error).split())[:200]}"
         raise ConfigError(what, "Take the YAML that ROS's camera_calibration writes.") from error
 

@@ -144,9 +144,7 @@ class RosNode:
         return Node(self._domain, str(session.zid()), 0, self._name, self._namespace)
 
     def _endpoint(self, node: Node, kind: Kind, number: int, name: str, topic: Topic[Any]) -> Endpoint:
-        urgent = topic.qos.reliability == Reliability.BEST_EFFORT
-        qos = RosQos(not urgent, topic.qos.latched, 1 if topic.qos.latched else SENSOR_DEPTH if urgent else DEPTH)
-        return Endpoint(node, number, kind, name, topic.ros_type, self._hash(topic.ros_type), qos)
+        return Endpoint(node, number, kind, name, topic.ros_type, self._hash(topic.ros_type), ros_qos(topic))
 
     def _hash(self, ros_type: str) -> str:
         return self._hashes.get(ros_type) or type_hash(ros_type)
@@ -156,6 +154,12 @@ class RosNode:
         self._tokens.append(
             self._connection.declare(lambda session: session.liveliness().declare_token(token(self._node(session))))
         )
+
+
+def ros_qos(topic: Topic[Any]) -> RosQos:
+    """Quality of service of a topic, as ROS has it."""
+    urgent = topic.qos.reliability == Reliability.BEST_EFFORT
+    return RosQos(not urgent, topic.qos.latched, 1 if topic.qos.latched else SENSOR_DEPTH if urgent else DEPTH)
 
 
 def _attach(

@@ -12,11 +12,11 @@ from typing import Any
 
 from lira.hal.bus.publisher import Publisher
 from lira.hal.bus.reader import Reader
-from lira.hal.bus.sensors import SENSORS, listened_to, observation_of
+from lira.hal.bus.sensors import SENSORS, listened_to, observation_of, sensors_of
 from lira.hal.bus.topics import CMD_VEL, SENSOR, Topic
 from lira.hal.clock import ClockEstimate, is_fresh
 from lira.hal.errors import BusError, ConfigError, DeviceError
-from lira.hal.messages import STOP, Applied, Command, Observation, Reason, Twist, TwistStamped
+from lira.hal.messages import STOP, Applied, Command, Observation, Reason, Source, Twist, TwistStamped
 from lira.hal.port import DeviceHealth
 from lira.hal.profile import RobotProfile
 from lira.robot.ros2.forms import placed_scan, plain_picture
@@ -32,6 +32,8 @@ LOOK_S = 0.002
 SEND_S = 0.05
 STOOD_S = 0.1  # nobody here waits so long before it looks at the time again
 FAREWELL = 3
+HAND_S = 0.3  # longer than a multiplexer takes the hand's last word for its command
+USEFUL = ("odom", "imu", "battery")
 
 
 @dataclass(frozen=True, slots=True)
@@ -39,12 +41,14 @@ class Interface:
     """How the robot's ROS 2 names and types differ from ours, and how its lidar is mounted.
 
     `topics` gives another topic to cmd_vel or a sensor (scan, camera, ... of `hal.bus.sensors`); `stamped`: it wants
-    TwistStamped.
+    TwistStamped. `manual` is a topic that its multiplexer puts before all others, "" without one: the hand and the
+    emergency stop go there.
     """
 
     topics: Mapping[str, str] = field(default_factory=dict)
     stamped: bool = False
     lidar_yaw_rad: float = 0.0
+    manual: str = ""
 
     def __post_init__(self) -> None:
         """Raise `ConfigError` for a name that is none of ours."""
@@ -58,12 +62,19 @@ class Interface:
         qos = SENSOR if ours.qos.latched else ours.qos
         return replace(ours, key=self.topics.get(name, ours.key).strip("/"), kind=kind, qos=qos)
 
+    @property
+    def first(self) -> Topic[Any] | None:
+        """The topic that goes before all others, None without one."""
+        return replace(self.topic(COMMANDED), key=self.manual.strip("/")) if self.manual else None
+
 
 class Ros2Robot:
-    """Implements `hal.port.Robot`, `SensorEvents` and `DeviceMonitor`. Its clock is the robot's ROS clock.
+    """Implements `hal.port.Robot`, `SensorEvents`, `DeviceMonitor` and `MotorSwitch`. Its clock is the ROS clock there.
 
     Everything that makes it safe happens on this side. `Applied` says what was sent: what the robot's own stack makes
-    of it, nobody here knows. Its "lidar" or "camera" is lost while no new scan or picture comes.
+    of it, nobody here knows. Its "lidar" or "camera" is lost while no new scan or picture comes. Where its multiplexer
+    has a topic that goes first, the hand drives there, and while the emergency stop holds, zeros are sent there: on any
+    other somebody else may go before. Left alone that topic lets others drive again.
     """
 
     def __init__(self, profile: RobotProfile, far: Transport, interface: Interface, form: Form = BRIDGE) -> None:
@@ -75,6 +86,10 @@ class Ros2Robot:
             sensor.name: far.reader(interface.topic(sensor.name)) for sensor in listened_to(profile)
         }
         self._wheels: Publisher[Any] = far.publisher(interface.topic(COMMANDED))
+        first = interface.first
+        self._first: Publisher[Any] | None = None if first is None else far.publisher(first)
+        self._cut = False  # by the emergency stop
+        self._hand_s = -math.inf  # when the hand drove last, by our own clock
         self._newest: dict[str, Any] = {}
         self._open = False
         self._seq = 0
@@ -123,10 +138,17 @@ class Ros2Robot:
             now_s = self._now()  # not before: whoever waited for the lock would take an old command for a new one
             if now_s - command.stamp_s > self._profile.control.robot_timeout_s:
                 twist, reason = STOP, Reason.STALE
+            if command.source is Source.TELEOP:
+                self._hand_s = time.monotonic()
             due = twist != self._sent or time.monotonic() - self._sent_s >= SEND_S
             if due:
                 self._send(twist, now_s)
         return Applied(twist, now_s, command.source, reason, (), command.answers, now_s - command.stamp_s)
+
+    def cut_motors(self, off: bool) -> None:
+        """Hold the robot by the topic that goes first, where there is one, or let go of it; with the next `drive`."""
+        self._cut = off
+        self._sent_s = -math.inf
 
     def device_health(self) -> DeviceHealth:
         """Which of scan and picture are silent now, and how often either was."""
@@ -160,6 +182,11 @@ class Ros2Robot:
         """What is missing, each with its remedy."""
         return {name: f"'{self._interface.topic(name).key}' is silent. {self._form.silent}" for name in self._silent()}
 
+    def missing(self) -> dict[str, str]:
+        """Topics of sensors that it can do without, from which nothing ever came, by the sensors' names."""
+        wanted = [each.name for each in sensors_of(self._profile) if each.name in USEFUL]
+        return {name: self._interface.topic(name).key for name in wanted if name not in self._newest}
+
     def _now(self) -> float:
         """The robot's time. If this process stood still it counts that itself: what comes first is of before, and by
         that no time would have passed.
@@ -172,8 +199,14 @@ class Ros2Robot:
         return self._told[0]
 
     def _send(self, twist: Twist, now_s: float) -> None:
+        """A hand that has just let go says zero on its topic, too."""
         self._sent, self._sent_s = twist, time.monotonic()
-        self._wheels.put(TwistStamped(now_s, twist) if self._interface.stamped else twist, now_s)
+        by_hand = self._sent_s - self._hand_s < HAND_S
+        message = TwistStamped(now_s, twist) if self._interface.stamped else twist
+        if self._first is not None and (by_hand or self._cut):
+            self._first.put(message, now_s)
+            message = TwistStamped(now_s, STOP) if self._interface.stamped else STOP
+        self._wheels.put(message, now_s)
 
     def _listen(self) -> bool:
         """Take what came; returns whether anything did."""

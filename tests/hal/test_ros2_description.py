@@ -26,6 +26,8 @@ from lira.hal.messages.compression import compress, compress_depth
 from lira.hal.messages.images import size_of
 from lira.hal.messages.ros_table import CODECS
 from lira.hal.profile import known_profiles, load_profile
+from lira.hal.testing import NullRobot
+from lira.robot.settings import load_camera_info
 
 ROSBOT = load_profile("rosbot2")
 CALIBRATION = """
@@ -135,6 +137,19 @@ def test_a_calibration_file_of_ros_is_read_for_pictures_of_the_profiles_size(tmp
     assert info.k == pytest.approx((550.0, 0.0, 320.0, 0.0, 555.0, 240.0, 0.0, 0.0, 1.0))
     assert info.p[:4] == pytest.approx((545.0, 0.0, 320.0, 0.0))
     assert decode(type(info), encode(info)) == info
+
+
+def test_a_calibration_that_the_settings_name_is_on_the_bus_with_each_picture_for_ros2(tmp_path):
+    (tmp_path / "astra.yaml").write_text(CALIBRATION)
+    settings = tmp_path / "my-robot.toml"
+    settings.write_text('[camera]\ncalibration = "astra.yaml"\n')
+    info = load_camera_info(settings, ROSBOT.camera)
+    assert load_camera_info(None, ROSBOT.camera) is None
+    inner = NullRobot(ROSBOT, time.monotonic, time.sleep)
+    with served(inner, floor=True, calibration=info) as robot, joined(robot) as bus:
+        reader = bus.reader(CAMERA_INFO)
+        wait_for(lambda: reader.newest() is not None)
+        assert reader.newest().message.k == pytest.approx(info.k)
 
 
 @pytest.mark.parametrize(

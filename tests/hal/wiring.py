@@ -51,7 +51,7 @@ class StuckRobot(NullRobot):
 class Served:
     """A robot that is served from a thread; `failure` is what the server ended with. On a `floor` it has no arena."""
 
-    def __init__(self, inner: NullRobot, *, lockstep: bool = False, floor: bool = False) -> None:
+    def __init__(self, inner: NullRobot, *, lockstep: bool = False, floor: bool = False, **more) -> None:
         self.inner = inner
         self.name, self.endpoint = new_name(), new_endpoint()
         self.stop, self.is_ready = threading.Event(), threading.Event()
@@ -59,7 +59,7 @@ class Served:
         self.governed = GovernedRobot(inner)
         self._bus = Bus(self.name, listen=self.endpoint)
         arena = None if floor else inner
-        self._server = HalServer(self.governed, self._bus, arena, lockstep=lockstep, ready=self.is_ready.set)
+        self._server = HalServer(self.governed, self._bus, arena, lockstep=lockstep, ready=self.is_ready.set, **more)
         self._thread = threading.Thread(target=self._run)
         self._thread.start()
 
@@ -80,8 +80,8 @@ class Served:
 
 
 @contextmanager
-def served(inner: NullRobot, *, lockstep: bool = False, floor: bool = False) -> Iterator[Served]:
-    robot = Served(inner, lockstep=lockstep, floor=floor)
+def served(inner: NullRobot, *, lockstep: bool = False, floor: bool = False, **more) -> Iterator[Served]:
+    robot = Served(inner, lockstep=lockstep, floor=floor, **more)
     try:
         wait_for(lambda: robot.is_ready.is_set() or robot.failure is not None, 10.0)
         yield robot

@@ -3,7 +3,7 @@
 from lira.hal.bus.attachment import Attachment
 from lira.hal.bus.reader import RawSample
 from lira.hal.bus.services import LOCKSTEP, Info
-from lira.hal.bus.topics import DECISION, METHOD
+from lira.hal.bus.topics import APPLIED, CAMERA, DECISION, METHOD, SCAN
 from lira.hal.messages.codec import encode
 from lira.tools.recording.layout import Head
 from lira.tools.recording.timeline import TimeLine
@@ -18,8 +18,8 @@ def head_of(profile):
 
 
 def write_reports(folder, profile, reports, *, skip=()):
-    """Record decisions and calls; those of the numbers in `skip` are lost."""
-    topics = {topic.kind: topic for topic in (DECISION, METHOD)}
+    """Record decisions, calls and whatever else has a stamp; those of the numbers in `skip` are lost."""
+    topics = {topic.kind: topic for topic in (DECISION, METHOD, APPLIED, SCAN, CAMERA)}
     line = TimeLine(100 * SECOND_NS, 0, lockstep=True)
     counts = dict.fromkeys(topics, 0)
     with RecordingWriter(folder, head_of(profile), split_bytes=2**30) as writer:

@@ -2,15 +2,11 @@
 
 import json
 from dataclasses import replace
-from functools import partial
 
 import msgspec
 import pytest
-import torch
 from recorded_run import write_reports
 
-from lira.fusion.inference.threads import one_thread
-from lira.fusion.learning.trainer import InlineTrainer
 from lira.fusion.methods.presets import method_named
 from lira.hal.errors import ConfigError, StorageError
 from lira.hal.messages import CallName, Decision, MethodCalls
@@ -20,45 +16,6 @@ from lira.tools.inquiry.rerun import go_again
 from lira.tools.inquiry.settings import changed, with_setting
 from lira.tools.inquiry.trace import read_traces, steps_of
 from lira.tools.recording.reader import Recording
-from lira.tools.runs.plan import Plan
-from lira.tools.runs.simulated import simulate
-from lira.tools.runs.teach import teach_on
-
-WORLD = """
-description = "A few metres of straight line with one box on it"
-[line]
-pieces = [{ straight_m = 14.0 }]
-[[box]]
-x_m = 5.0
-y_m = 0.0
-[limits]
-finish_m = 8.0
-lost_m = 1.5
-"""
-
-
-def taught(method, tmp_path):
-    """Teach for one lap; return the profile and all that was told on the bus."""
-    torch.set_num_threads(1)  # as whoever teaches does: sums depend on it
-    one_thread()
-    path = tmp_path / "few.toml"
-    path.write_text(WORLD)
-    reports = []
-    with simulate(str(path), "thesis-sim", renderer="sketch") as robot:
-        trainer = partial(InlineTrainer, adopt_after_s=robot.profile.period_s)
-        plan = Plan(method_named(method), laps=1, unseen=1, pair="line")
-        teach_on(robot, robot.arena, robot.arena.world, plan, trainer, publish=reports.append)
-        return robot.profile, reports
-
-
-@pytest.fixture(scope="module", params=["plus", "hold"])
-def run(request, tmp_path_factory):
-    return taught(request.param, tmp_path_factory.mktemp("world"))
-
-
-@pytest.fixture(scope="module")
-def plus(tmp_path_factory):
-    return taught("plus", tmp_path_factory.mktemp("world"))
 
 
 def trace_of(folder):

@@ -13,6 +13,8 @@ import pytest
 from lira.hal.errors import ConfigError
 from lira.tools.cli import EXTRAS, Parser, main
 from lira.tools.lifecycle import folder as folders
+from lira.tools.lifecycle import services
+from lira.tools.lifecycle.arguments import Ports, add_setup, setup_of
 from lira.tools.lifecycle.folder import AlreadyUpError, StateFolder
 from lira.tools.lifecycle.line import WINDOW_S, Rate
 from lira.tools.lifecycle.logs import Follower, last_lines
@@ -22,7 +24,6 @@ from lira.tools.lifecycle.setup import Setup, endpoint_of, run_folder
 from lira.tools.lifecycle.status import as_object, as_text, look
 from lira.tools.lifecycle.table import PROCESSES, SETS, Host, chosen, rows
 from lira.tools.verbs import VERBS, module_of
-from lira.tools.verbs.operation import up
 
 SETUP = Setup(
     processes=tuple(process.name for process in PROCESSES),
@@ -62,7 +63,6 @@ def test_the_packages_of_a_row_have_an_extra_that_brings_them():
 
 def test_sets_name_rows_of_the_laptop_and_the_robot_comes_first():
     by_name = {process.name: process for process in PROCESSES}
-    assert list(SETS) == list(up.SETS)
     for names in SETS.values():
         assert all(by_name[name].host is Host.LAPTOP for name in names)
         assert by_name[names[0]].is_robot
@@ -101,8 +101,8 @@ def test_what_is_learned_is_kept_by_method_and_place():
 
 def asked(*words):
     parser = argparse.ArgumentParser()
-    up.add_arguments(parser)
-    return up.setup_of(parser.parse_args(words))
+    add_setup(parser)
+    return setup_of(parser.parse_args(words), Ports())
 
 
 def test_a_twin_is_the_usual_and_of_the_worlds_experiment():
@@ -360,3 +360,64 @@ def test_the_verbs_stand_in_the_table():
     assert {VERBS[name].module for name in ("up", "status", "logs", "down")} == {
         module_of("operation", name) for name in ("up", "status", "logs", "down")
     }
+
+
+# Services of systemd
+
+SHOWN = """Id=lira-rosbot-twin.service
+ActiveState=active
+MainPID=11
+NRestarts=0
+StatusText=twin 'rosbot' serves
+StateChangeTimestampMonotonic=910000000
+Result=success
+
+MainPID=0
+Id=lira-rosbot-learner.service
+ActiveState=activating
+NRestarts=3
+StatusText=
+StateChangeTimestampMonotonic=999000000
+Result=watchdog
+"""
+
+
+@pytest.fixture
+def deployed(tmp_path, monkeypatch):
+    monkeypatch.setenv("HOME", str(tmp_path))
+    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path / "state"))
+    folder = tmp_path / services.config_folder("rosbot")
+    folder.mkdir(parents=True)
+    setup = Setup(processes=("twin", "learner"), world="line")
+    (folder / services.SETUP).write_bytes(msgspec.json.encode(setup))
+    return setup
+
+
+def test_services_are_told_as_any_process_is(deployed, monkeypatch):
+    asked = []
+    monkeypatch.setattr(services, "ask_systemd", lambda words: asked.append(words) or SHOWN)
+    state = services.look("rosbot", services.ask_systemd)
+    assert asked[0][2:] == ["lira-rosbot-twin.service", "lira-rosbot-learner.service"]
+    twin, learner = state.processes
+    assert (twin.phase, twin.pid, twin.starts, twin.says) == (Phase.RUNS, 11, 1, "twin 'rosbot' serves")
+    assert (learner.phase, learner.pid, learner.starts, learner.ended) == (Phase.STARTS, None, 4, "watchdog")
+    assert state.since_s == 910.0
+    assert (state.setup, state.runs) == (deployed, False)
+
+
+def test_status_and_down_know_services(deployed, tmp_path, monkeypatch, capsys):
+    program = tmp_path / "systemctl"
+    (tmp_path / "shown").write_text(SHOWN)
+    program.write_text(f'#!/bin/sh\necho "$@" >> {tmp_path}/asked\n[ "$2" = show ] && cat {tmp_path}/shown\nexit 0\n')
+    program.chmod(0o755)
+    monkeypatch.setenv("PATH", f"{tmp_path}:{os.environ['PATH']}")
+    assert main(["status"]) == 1
+    assert "(services of systemd): twin in 'line'" in capsys.readouterr().out
+    assert main(["down"]) == 0
+    assert "stopped until the machine starts again" in capsys.readouterr().out
+    assert (tmp_path / "asked").read_text().splitlines()[-1] == "--user stop lira-rosbot.target"
+
+
+@pytest.mark.parametrize("text", ["", SHOWN.replace("activating", "inactive").replace("=active\n", "=inactive\n")])
+def test_services_that_are_stopped_or_of_no_systemd_are_not_up(deployed, text):
+    assert services.look("rosbot", lambda _: text) is None

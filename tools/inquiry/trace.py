@@ -112,17 +112,17 @@ class Step:
 def steps_of(calls: Sequence[MethodCall], outcomes: Mapping[int, object] | None = None) -> list[Step]:
     """Put calls together to steps; with `outcomes` (by number of the call) it is those that came of them."""
     steps: list[Step] = []
-    phases, fresh = [Phase.TRAIN], False
+    phases, fresh = {0: Phase.TRAIN}, False
     for number, call in enumerate(calls):
         outcome = outcomes.get(number) if outcomes is not None else _recorded(call)
         match call.name:
             case CallName.ALONE:
-                phases.append(Phase(call.argument))
+                phases[len(phases)] = Phase(call.argument)
             case CallName.RESET:
                 fresh = True
             case CallName.UPDATE:
                 adopted = outcome if isinstance(outcome, State) else None
-                steps.append(Step(call.time_s, phases[call.target], fresh, adopted=adopted))
+                steps.append(Step(call.time_s, phases.get(call.target, Phase.PROVE), fresh, adopted=adopted))
                 fresh = False
             case CallName.PROPOSE if steps and isinstance(outcome, Decided):
                 steps[-1].number, steps[-1].decided = number, outcome

@@ -12,6 +12,7 @@ import msgspec
 from lira.hal.errors import LiraError, StorageError
 from lira.hal.server.server import stop_on_signal
 from lira.tools.launch.processes import ProcessError, how_ended
+from lira.tools.lifecycle import services
 from lira.tools.lifecycle.folder import StateFolder
 from lira.tools.lifecycle.logs import last_lines
 from lira.tools.lifecycle.records import STATE, ProcessState, State
@@ -54,7 +55,7 @@ def take_down(name: str, say: Say) -> bool:
     folder = StateFolder(name)
     pid = folder.supervisor()
     if pid is None:
-        return False
+        return _stop_services(name, say)
     os.kill(pid, signal.SIGTERM)
     said: set[str] = set()
     until_s = time.monotonic() + DOWN_S
@@ -65,6 +66,14 @@ def take_down(name: str, say: Say) -> bool:
         _say_stopped(folder, said, say)
         time.sleep(LOOK_S)
     _say_stopped(folder, said, say)
+    return True
+
+
+def _stop_services(name: str, say: Say) -> bool:
+    if services.look(name) is None:
+        return False
+    services.ask_systemd(["stop", services.target_name(name)])
+    say(f"{services.target_name(name)} is stopped until the machine starts again; for good: lira deploy --remove")
     return True
 
 

@@ -23,7 +23,7 @@ class ProcessState(msgspec.Struct, frozen=True):
 
 
 class State(msgspec.Struct, frozen=True):
-    """All that one supervisor has started."""
+    """All that one supervisor has started, or systemd, whose `pid` is 0 here."""
 
     setup: Setup
     pid: int

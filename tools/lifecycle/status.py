@@ -4,6 +4,7 @@ from typing import Any
 
 import msgspec
 
+from lira.tools.lifecycle import services
 from lira.tools.lifecycle.folder import StateFolder
 from lira.tools.lifecycle.records import HEARD, STATE, Heard, State
 from lira.tools.output.table import format_table
@@ -29,8 +30,8 @@ def look(name: str, now_s: float) -> Status:
     """Read what is written down about a name. Raises `ConfigError` for what cannot be read."""
     folder = StateFolder(name)
     pid = folder.supervisor()
-    state = None if pid is None else folder.read(STATE, State)
-    if state is None or state.pid != pid:
+    state = services.look(name) if pid is None else folder.read(STATE, State)
+    if state is None or state.pid != (pid or 0):
         return Status(name, now_s)
     heard = folder.read(HEARD, Heard)
     fresh = heard is not None and 0.0 <= now_s - heard.time_s <= OLD_S
@@ -61,7 +62,9 @@ def as_text(status: Status) -> str:
     state, heard, now_s = status.state, status.heard, status.now_s
     if state is None:
         return f"nothing is up for '{status.name}'; start it with: lira up"
-    blocks = [f"'{status.name}' is up for {_for(now_s - state.since_s)}: {state.setup.where}", _processes(state, now_s)]
+    by = "" if state.pid else " (services of systemd)"
+    head = f"'{status.name}' is up for {_for(now_s - state.since_s)}{by}: {state.setup.where}"
+    blocks = [head, _processes(state, now_s)]
     if heard is None:
         blocks.append("nothing is heard of the robot: see lira logs monitor")
         return "\n\n".join(blocks)

@@ -42,12 +42,13 @@ GROUPS = {
         "joystick": "drive by hand: a gamepad on this machine, straight to the robot",
         "console": "watch the robot learn on a screen",
         "web": "watch, teach and drive the robot from a page in the browser",
-        "view": "show the robot in Foxglove, and its numbers to Prometheus; it only looks",
+        "view": "show the robot in Foxglove or Rerun, and its numbers to Prometheus; it only looks",
         "world": "draw a world from above and as the camera sees it",
     },
     ("records", "Records"): {
         "record": "record everything on a robot's bus, for later and for others' tools",
         "info": "what a recording holds",
+        "explain": "why the robot did what it did: of a recording, or now",
         "rerun": "put a recorded run through its method again: the same, or what would have been otherwise",
         "export": "a recorded run as a data set: LeRobot, robomimic, CSV",
         "import": "a LeRobot data set or a bag as demonstrations, to start from",
@@ -58,6 +59,7 @@ GROUPS = {
         "status": "what is up: processes, rates, ages, link, who drives",
         "logs": "what the processes that are up have written",
         "down": "stop all that is up, drivers first and the robot last",
+        "deploy": "run them from the start of the machine: systemd units, keys and rules, here or on the robot",
         "keys": "make the keys that say who may drive a robot, and encrypt the bus",
     },
     ("checks", "Checks"): {

@@ -31,7 +31,8 @@ def run(args: argparse.Namespace) -> int:
     found = sorted(folder.logs.glob("*.log")) if folder.logs.is_dir() else []
     names = [log.stem for log in found]
     if not found:
-        raise ConfigError(f"nothing was ever up as '{args.name}' here", "Start it with: lira up.")
+        remedy = f"Start it with: lira up. Of services: journalctl --user -u 'lira-{args.name}-*'."
+        raise ConfigError(f"nothing was ever up as '{args.name}' here", remedy)
     if args.process is not None and args.process not in names:
         raise ConfigError(f"there is no log of '{args.process}'", f"There is one of: {', '.join(names)}.")
     logs = [log for log in found if args.process in (None, log.stem)]

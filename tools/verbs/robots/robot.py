@@ -60,9 +60,11 @@ def run(args: argparse.Namespace) -> int:
     """Serve until told to stop."""
     from lira.hal.profile import load_profile
     from lira.hal.server.serve import serve
+    from lira.robot.settings import load_camera_info
     from lira.tools.launch.notify import Notifier
 
     check_devices(args)
+    calibration = None if args.driver else load_camera_info(args.settings, load_profile(args.profile).camera)
     notifier = Notifier.from_environment()
     robot = open_own(args) if args.driver is not None else open_rosbot(args, load_profile(args.profile))
 
@@ -74,7 +76,15 @@ def run(args: argparse.Namespace) -> int:
         notifier.ready(words)
         watch(robot, stop)
 
-    serve(robot, args.name, args.listen, insecure=args.insecure, ready=ready, alive=notifier.alive)
+    serve(
+        robot,
+        args.name,
+        args.listen,
+        calibration=calibration,
+        insecure=args.insecure,
+        ready=ready,
+        alive=notifier.alive,
+    )
     return 0
 
 

@@ -7,7 +7,8 @@ it. robot/README.md says more.
 
 examples:
   lira ros2 --look --connect rosbot:7447        what is there, on which keys, and the words for it
-  lira ros2 --connect rosbot:7447 --lidar-yaw 180
+  lira ros2 --connect rosbot:7447 --image rosbot-jazzy
+  lira ros2 --image list                        which images are known
   lira ros2 --rmw --connect rosbot:7447 --domain 3
   lira ros2 --connect rosbot:7447 --namespace robot1 --topic odom=odometry/filtered --topic cmd_vel=base/cmd_vel
   lira drive lidar-expert
@@ -18,18 +19,20 @@ import math
 import sys
 import threading
 import time
-from collections.abc import Mapping
 from contextlib import closing
-from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 from lira.hal.errors import BusError, ConfigError
-from lira.tools.options import add_profile, add_ros_domain, add_server
+from lira.tools.options import add_ros_domain, add_server
 
 if TYPE_CHECKING:
     from lira.hal.bus.bus import Bus
+    from lira.hal.ros_graph.look import Sight
     from lira.hal.ros_graph.node import RosNode
+    from lira.robot.ros2.robot import Ros2Robot
+    from lira.tools.ros2.wants import Wanted
 
+PROFILE = "rosbot2"
 LINK_S = 3.0
 LISTEN_S = 3.0
 NODE = "lira"
@@ -48,10 +51,20 @@ ONE_LINK = (
 )
 
 
+MISSING = (
+    "nothing comes on '{key}', so there is no {name}: name the topic with --topic {name}=ROS_TOPIC (--look lists them)"
+)
+
+
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
     add = parser.add_argument
-    add("--connect", required=True, metavar="HOST:PORT", help="where the bridge listens, or rmw_zenoh's router")
+    add("--connect", metavar="HOST:PORT", help="where the bridge listens, or rmw_zenoh's router")
+    add(
+        "--image",
+        metavar="NAME",
+        help="names, types, mounting and profile of a known ROS image, or of a .toml file; list: which there are",
+    )
     add("--look", action="store_true", help="only list what comes there, and print the words that drive it")
     add("--rmw", action="store_true", help="its ROS runs rmw_zenoh, and no bridge is needed")
     add_ros_domain(parser, "with --rmw: the robot's ROS_DOMAIN_ID")
@@ -68,13 +81,20 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="NAME=ROS_TOPIC",
         help="another topic for scan, camera, odom, imu, battery or cmd_vel; may be given several times",
     )
-    add("--lidar-yaw", type=float, default=0.0, metavar="DEG", help="how the lidar's frame is turned (ROSbot 2: 180)")
-    add_profile(parser, "rosbot2")
+    add("--lidar-yaw", type=float, metavar="DEG", help="how the lidar's frame is turned (default: the image's, or 0)")
+    add("--profile", help=f"robot by name or .toml file (default: the image's, or {PROFILE})")
     add_server(parser)
 
 
 def run(args: argparse.Namespace) -> int:
     """Serve until told to stop, or say what there is."""
+    from lira.robot.ros2.image import known_images, load_image
+
+    if args.image == "list":
+        print("\n".join(f"{name:<20}{description}" for name, description in known_images().items()))
+        return 0
+    if args.connect is None:
+        raise ConfigError("no --connect", "Give HOST:PORT of the bridge on the robot, or of rmw_zenoh's router.")
     if args.look:
         from lira.hal.ros_graph.look import look
         from lira.tools.ros2.page import page
@@ -89,13 +109,18 @@ def run(args: argparse.Namespace) -> int:
     from lira.robot.ros2.transport import BRIDGE, RMW
     from lira.tools.launch.notify import Notifier
     from lira.tools.output.troubles import watch
+    from lira.tools.ros2.wants import Place, commanded, published
 
     notifier = Notifier.from_environment()
-    names = topics(args.topic)
-    Interface(names)
-    profile = load_profile(args.profile)
-    wanted = commanded(args, names.get("cmd_vel", "cmd_vel"))
-    interface = Interface(names, wanted.stamped, math.radians(args.lidar_yaw))
+    image = None if args.image is None else load_image(args.image)
+    named = topics(args.topic)
+    Interface(named)
+    profile = load_profile(args.profile or (PROFILE if image is None else image.profile))
+    sight, place = seen(args), Place(args.domain if args.rmw else None, args.namespace)
+    names = named if image is None else image.choose(published(sight, place)) | named
+    wanted = commanded(sight, place, names.get("cmd_vel", "cmd_vel"), args.cmd_vel, image)
+    yaw_deg = args.lidar_yaw if args.lidar_yaw is not None else 0.0 if image is None else image.lidar_yaw_deg
+    interface = Interface(names, wanted.stamped, math.radians(yaw_deg), "" if image is None else image.manual)
     with closing(open_far(args, wanted)) as far:
         robot = Ros2Robot(profile, far, interface, RMW if args.rmw else BRIDGE)
 
@@ -103,7 +128,8 @@ def run(args: argparse.Namespace) -> int:
             words = f"robot '{args.name}' (ROS 2 at {args.connect}) serves on {args.listen}"
             print(words, flush=True)
             notifier.ready(words)
-            for warning in warnings(far, stamped=interface.stamped):
+            told = () if image is None else image.told
+            for warning in [*warnings(far, stamped=interface.stamped), *lacking(robot), *told]:
                 print(f"warning: {warning}", file=sys.stderr, flush=True)
             watch(robot, stop)
 
@@ -111,38 +137,19 @@ def run(args: argparse.Namespace) -> int:
     return 0
 
 
-@dataclass(frozen=True)
-class Wanted:
-    """How a robot wants its commands: with a stamp or without, and how it hashes the type."""
-
-    stamped: bool = False
-    hashes: Mapping[str, str] = field(default_factory=dict)
-
-
-def commanded(args: argparse.Namespace, topic: str) -> Wanted:
-    """Look what the robot's own nodes say that they listen to. Raises `ConfigError` if that is not what is asked for.
-
-    A bridge that is not there yet, or lets no token through, says nothing.
-    """
-    from lira.hal.ros_graph.look import look
-    from lira.tools.ros2.sight import CMD_VEL_WORD, heard_commands
+def seen(args: argparse.Namespace) -> "Sight":
+    """Look what its own nodes say and hear. A bridge that is not there yet, or lets no token through, shows nothing."""
+    from lira.hal.ros_graph.look import Sight, look
 
     try:
-        sight = look(args.connect)
+        return look(args.connect)
     except BusError:
         if args.rmw:
             raise
-        return Wanted(args.cmd_vel == "twist_stamped")
-    name = "/".join(part for part in (args.namespace.strip("/"), topic.strip("/")) if part)
-    hashes = heard_commands(sight, args.domain if args.rmw else None, name)
-    words = sorted(CMD_VEL_WORD[kind] for kind in hashes)
-    if args.cmd_vel and words and args.cmd_vel not in words:
-        raise ConfigError(f"the robot listens to no {args.cmd_vel} on '{name}'", f"Say --cmd-vel {words[0]}.")
-    word = args.cmd_vel or (words[-1] if words else "twist")  # of both, the one with a stamp
-    return Wanted(word == "twist_stamped", hashes)
+        return Sight()
 
 
-def open_far(args: argparse.Namespace, wanted: Wanted) -> "Bus | RosNode":
+def open_far(args: argparse.Namespace, wanted: "Wanted") -> "Bus | RosNode":
     """Open what carries the robot's topics."""
     from lira.hal.bus.bus import Bus
     from lira.hal.ros_graph.node import RosNode
@@ -176,3 +183,8 @@ def warnings(far: "Bus | RosNode", *, stamped: bool) -> list[str]:
     if far.links() < LINKS_PER_PEER:
         found.append(ONE_LINK)
     return found
+
+
+def lacking(robot: "Ros2Robot") -> list[str]:
+    """What never came of what is of use, after what `warnings` waited for."""
+    return [MISSING.format(name=name, key=key) for name, key in robot.missing().items()]

@@ -1,7 +1,8 @@
 """Begin a project of your own: an expert, a method, a robot, a sensor or a world, with tests that pass.
 
-It writes a folder with the thing itself, a test, a README and, so that other folders know it by its name once it is
-installed, a pyproject.toml with the entry point. Change it step by step, and keep the tests passing.
+It writes a folder with the thing itself, a test, a README, a workflow that runs the test at every push and, so that
+other folders know it by its name once it is installed, a pyproject.toml with the entry point. Change it step by step,
+and keep the tests passing.
 
 examples:
   lira new expert wall                 an expert in the folder wall/
@@ -23,15 +24,19 @@ from lira.hal.errors import ConfigError, StorageError
 
 
 class Kind(NamedTuple):
-    """What can be begun: its group of entry points, and what in the module the entry point names."""
+    """What can be begun: its group of entry points, and what in the module the entry point names.
+
+    `part` of the installation is what its tests need.
+    """
 
     door: str
     thing: str
+    part: str = "drive"
 
 
 KINDS = {
     "expert": Kind("experts", "$package"),
-    "method": Kind("methods", "Settings"),
+    "method": Kind("methods", "Settings", "learn"),
     "robot": Kind("robots", "$title"),
     "sensor": Kind("robots", "robot"),
     "world": Kind("", ""),
@@ -57,9 +62,10 @@ def run(args: argparse.Namespace) -> int:
 
 def write_project(kind: str, name: str, folder: Path) -> list[Path]:
     """Write a project of this kind. Raises `ConfigError` for a bad name, `StorageError` if it cannot be written."""
-    words = {"kind": kind, "name": name, "package": package_of(name), "door": KINDS[kind].door}
+    about = KINDS[kind]
+    words = {"kind": kind, "name": name, "package": package_of(name), "door": about.door, "part": about.part}
     words["title"] = "".join(part.capitalize() for part in words["package"].split("_"))
-    words["thing"] = Template(KINDS[kind].thing).substitute(words)
+    words["thing"] = Template(about.thing).substitute(words)
     if folder.exists():
         raise ConfigError(f"{folder} is there already", "Choose another name, or another folder with --into.")
     texts = {place(source, words["package"]): source.read_text(encoding="utf-8") for source in templates(kind)}
@@ -96,4 +102,6 @@ def templates(kind: str) -> list[Traversable]:
 def place(source: Traversable, package: str) -> Path:
     """Return where in the project a template goes."""
     name = source.name.removesuffix(".tmpl").replace("module", package)
+    if name.endswith(".yml"):
+        return Path(".github") / "workflows" / name
     return Path("tests") / name if name.startswith("test_") else Path(name)

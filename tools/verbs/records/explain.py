@@ -1,0 +1,89 @@
+"""Say why a robot did what it did: who drove, what everybody proposed, what decided, what the wheels got and why.
+
+Of a recording, or of a robot on the bus as it is now. It names the line of Algorithm 1 (thesis, section III) that
+decided, the activations and the consensus behind it, what was learned, the command that was applied with its age and
+its clamps, and why the robot stood or moved.
+
+examples:
+  lira explain runs/demo-20261127-101500 --last-call
+  lira explain runs/mine --last-stop --out why        with the picture and the scan of that moment, into why/
+  lira explain runs/mine --at 52.4 --json -           52.4 s after the recording began
+  lira explain --connect 192.168.1.20:7447            the robot as it is now
+"""
+
+import argparse
+import json
+import sys
+import time
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from lira.hal.errors import ConfigError
+from lira.tools.options import add_client, add_json
+
+if TYPE_CHECKING:
+    from lira.tools.inquiry.moment import Moment
+
+HEARD_S = 1.5
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the arguments."""
+    add = parser.add_argument
+    add("file", type=Path, nargs="?", metavar="FILE", help="an .mcap file, or the folder of a recording or a run")
+    when = parser.add_mutually_exclusive_group()
+    when.add_argument("--at", type=float, metavar="S", help="at this time, in seconds since the recording began")
+    when.add_argument("--last-call", action="store_true", help="when the person was called last")
+    when.add_argument("--last-stop", action="store_true", help="when the robot stopped last (default)")
+    add("--out", type=Path, metavar="DIR", help="write the picture and the scan of that moment there")
+    add_client(parser)
+    add_json(parser)
+
+
+def run(args: argparse.Namespace) -> int:
+    """Find the moment and explain it."""
+    from lira.tools.inquiry.pictures import write_pictures
+    from lira.tools.inquiry.why import plain, words
+    from lira.tools.output.machine import take_stdout, write_file
+
+    if args.file is None and (args.at is not None or args.last_call or args.last_stop):
+        raise ConfigError("a time is one of a recording", "Name its file, or ask for now with neither.")
+    output = take_stdout() if args.json == "-" else sys.stdout
+    moment = now(args) if args.file is None else then(args)
+    files = [] if args.out is None else write_pictures(moment, args.out)
+    text = json.dumps({**plain(moment), "files": [str(path) for path in files]}, indent=2)
+    if args.json not in (None, "-"):
+        write_file(Path(args.json), text)
+    lines = [*words(moment), *([f"written: {', '.join(map(str, files))}"] if files else [])]
+    print(text if args.json == "-" else "\n".join(lines), file=output, flush=True)
+    return 0
+
+
+def then(args: argparse.Namespace) -> "Moment":
+    """The moment of a recording."""
+    from lira.tools.inquiry.moment import last_call, last_stop, moment_at
+    from lira.tools.recording.reader import Recording
+
+    recording = Recording(args.file)
+    if args.at is not None:
+        return moment_at(recording, recording.head.began_s + args.at)
+    return moment_at(recording, last_call(recording) if args.last_call else last_stop(recording))
+
+
+def now(args: argparse.Namespace) -> "Moment":
+    """The moment at hand."""
+    from lira.hal.bus.bus import Bus
+    from lira.hal.bus.services import info_from_json
+    from lira.hal.bus.topics import INFO
+    from lira.tools.cli import version
+    from lira.tools.inquiry.moment import moment_now
+    from lira.tools.launch.lifetime import CLOSE_S
+    from lira.tools.recording.layout import Head
+
+    bus = Bus(args.name, connect=args.connect, watch=True)
+    try:
+        info = info_from_json(bus.ask(INFO))
+        began_ns = time.time_ns()
+        return moment_now(bus, Head(bus.robot, version(), 0, began_ns, info), HEARD_S)
+    finally:
+        bus.close(CLOSE_S)
