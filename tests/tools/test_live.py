@@ -137,7 +137,7 @@ def test_a_lap_goes_on_is_put_back_or_is_over(state, phase, words, expected):
 
 def test_a_session_teaches_its_own_layout_until_the_novice_was_examined():
     lessons = Lessons(5)
-    lessons.note_lap(lap(Phase.TRAIN, layout=5))
+    lessons.note_lap(passed=True)
     assert lessons.layout == 5
     assert list(lessons.draw(3)) == [6, 7, 8]
     assert list(lessons.draw(2)) == [9, 10]  # nobody is examined on the same layout twice
@@ -148,11 +148,11 @@ def test_what_the_novice_failed_is_taught_until_it_was_passed_and_then_something
     failed = [lap(Phase.UNSEEN, layout=number, passed=number not in (2, 4)) for number in lessons.draw(4)]
     lessons.note_proof([lap(Phase.PROVE), *failed])
     assert lessons.layout == 2
-    lessons.note_lap(lap(Phase.TRAIN, layout=2, passed=False))
+    lessons.note_lap(passed=False)
     assert lessons.layout == 2
-    lessons.note_lap(lap(Phase.TRAIN, layout=2))
-    assert lessons.layout == 4
-    lessons.note_lap(lap(Phase.TRAIN, layout=4))
+    lessons.note_lap(passed=True)
+    assert (lessons.layout, lessons.taught) == (4, 2)  # a proof begins where it was taught
+    lessons.note_lap(passed=True)
     assert lessons.layout == 5
     assert list(lessons.draw(2)) == [6, 7]
 
@@ -160,7 +160,7 @@ def test_what_the_novice_failed_is_taught_until_it_was_passed_and_then_something
 def test_who_fails_where_it_was_taught_is_taught_there_again():
     lessons = Lessons(0)
     lessons.note_proof([lap(Phase.PROVE, passed=False)])
-    lessons.note_lap(lap(Phase.TRAIN))
+    lessons.note_lap(passed=True)
     assert lessons.layout == 0
 
 
