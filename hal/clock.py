@@ -123,10 +123,12 @@ class ClockEstimate:
         """Seconds on the robot's clock at `local_s`; only when `known`."""
         behind = 1.0 - self._rate
         newest_s = self._offsets[-1][0]
+        # Slower only while it is heard: what was heard last grows old as fast as ours once it is silent.
+        followed_s = min(local_s, newest_s + WINDOW_S)
         self._latest_s = max(
             self._latest_s,
             *(
-                local_s + offset_s - behind * (local_s - heard_s)
+                local_s + offset_s - behind * (followed_s - heard_s)
                 for heard_s, offset_s in self._offsets
                 if heard_s >= newest_s - WINDOW_S
             ),

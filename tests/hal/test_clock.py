@@ -71,6 +71,16 @@ def test_a_robot_whose_time_runs_as_ours_again_is_caught_up_with_at_once():
         assert clock.now(local_s) >= robot_s - 1e-9  # never behind its newest word
 
 
+@pytest.mark.parametrize("rate", [0.0, 0.4, 1.0])
+def test_what_was_heard_last_grows_old_once_the_robot_is_silent(rate):
+    """However slow its time seemed: delays that grow until nothing comes any more look like a clock that stops."""
+    clock = ClockEstimate()
+    for step in range(40):
+        clock.note(rate * 0.05 * step, 0.05 * step)
+    newest_s, silent_s = rate * 0.05 * 39, 0.05 * 39
+    assert clock.now(silent_s + 1.0) - newest_s >= 0.75
+
+
 def test_it_never_runs_back():
     clock = ClockEstimate()
     clock.note(100.0, 10.0)
