@@ -244,7 +244,7 @@ def test_up_tells_what_is_ready_and_down_ends_it(outside):
     assert folder.supervisor() == state.pid
     said.clear()
     assert take_down("rosbot", said.append)
-    assert sorted(said) == ["learner stopped", "robot stopped"]
+    assert said == ["learner stopped", "robot stopped"]
     assert not any(is_running(process.pid) for process in state.processes)
     assert not take_down("rosbot", said.append)
 

@@ -78,7 +78,7 @@ def _stop_services(name: str, say: Say) -> bool:
 
 
 def _say_stopped(folder: StateFolder, said: set[str], say: Say) -> None:
-    for process in _processes(folder):
+    for process in sorted(_processes(folder), key=lambda process: process.since_s):
         if process.phase is Phase.STOPPED and process.name not in said:
             said.add(process.name)
             say(f"{process.name} stopped")
