@@ -242,6 +242,9 @@ HEARS = Heard(
 )
 
 
+MONITOR = ProcessState("monitor", "hears", Phase.RUNS, NOW_S - 90.0, 12, 1)
+
+
 def write(folder, pid, processes=ROWS, heard=HEARS):
     folder.write(STATE, State(SETUP, pid, NOW_S - 300.0, processes))
     folder.write(HEARD, heard)
@@ -267,11 +270,13 @@ def test_status_tells_processes_topics_link_and_who_drives(state_folder):
 
 def test_all_is_well_when_all_of_it_runs_and_the_robot_is_heard(state_folder):
     with state_folder.held():
-        write(state_folder, state_folder.supervisor(), ROWS[:1])
+        write(state_folder, state_folder.supervisor(), (ROWS[0], MONITOR))
         assert look("rosbot", NOW_S).is_well
         old = look("rosbot", NOW_S + 60.0)
         assert not old.is_well
         assert "nothing is heard of the robot" in as_text(old)
+        write(state_folder, state_folder.supervisor(), ROWS[:1])  # where nobody listens
+        assert look("rosbot", NOW_S + 60.0).is_well
 
 
 def test_what_an_earlier_supervisor_wrote_is_not_told(state_folder):

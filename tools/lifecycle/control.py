@@ -5,6 +5,7 @@ import signal
 import sys
 import time
 from collections.abc import Callable
+from contextlib import suppress
 from pathlib import Path
 
 import msgspec
@@ -56,7 +57,8 @@ def take_down(name: str, say: Say) -> bool:
     pid = folder.supervisor()
     if pid is None:
         return _stop_services(name, say)
-    os.kill(pid, signal.SIGTERM)
+    with suppress(ProcessLookupError):  # it has ended just now
+        os.kill(pid, signal.SIGTERM)
     said: set[str] = set()
     until_s = time.monotonic() + DOWN_S
     while folder.supervisor() == pid:
