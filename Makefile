@@ -7,7 +7,7 @@ WORKERS := 2
 TEST_WORKERS := 4
 EXPERTS := $(foreach task,line eight passage garden corridor,camera:--task:$(task)) \
   $(foreach task,line passage garden,lidar:--task:$(task)) depth:--task:table-top
-BENCHES := twin lockstep latency train preprocess step log drivers takeover
+BENCHES := twin lockstep latency train preprocess step log drivers takeover web
 
 .DEFAULT_GOAL := help
 .PHONY: help setup foreign demo test test-fast check docs generated bench results experts wheel clean

@@ -16,6 +16,7 @@ from collections.abc import Generator, Iterator
 from pathlib import Path
 
 import pytest
+from foreign import NOT_INSTALLED
 from hypothesis import settings
 from kinds import kind_of
 from loopback import take_own_loopback
@@ -33,6 +34,7 @@ EXPECTED_SKIPS = {
     "in lockstep silence stops time",
     "no package index answers",
     "no client of others is installed",
+    *NOT_INSTALLED,
 }
 OPEN = "lira/open"  # in pytest's cache: what failed in the crowd
 MOST_OPEN = 40

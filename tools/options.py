@@ -1,6 +1,7 @@
 """Arguments that several verbs have, and their types. What does not fit is refused by argparse, with exit status 2."""
 
 import argparse
+import os
 
 from lira.fusion.experts.tasks import TASKS
 from lira.hal.bus.endpoint import DEFAULT_ENDPOINT, DEFAULT_ROBOT
@@ -144,6 +145,7 @@ def add_protocol(parser: argparse.ArgumentParser, layouts: str | None = None, pr
     )
 
 
-def add_ros_domain(parser: argparse.ArgumentParser, what: str) -> None:
-    """Declare `--domain`."""
-    parser.add_argument("--domain", type=natural, default=0, metavar="N", help=f"{what} {DEFAULT}")
+def add_ros_domain(parser: argparse.ArgumentParser, what: str, name: str = "--domain") -> None:
+    """Declare which domain of ROS 2 is meant; unless it is named it is that of ROS_DOMAIN_ID, as in ROS."""
+    default = os.environ.get("ROS_DOMAIN_ID") or "0"  # a text is read like one from the command line
+    parser.add_argument(name, type=natural, default=default, metavar="N", help=f"{what} {DEFAULT}")

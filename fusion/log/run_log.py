@@ -17,6 +17,7 @@ from lira.hal.config import MALFORMED, open_regular
 from lira.hal.errors import StorageError
 from lira.hal.messages import Action, CourseState, Decision, Phase
 
+UNPROVEN = "none"  # of a run in which nobody was asked to prove anything
 LINE_BYTES = 2**20  # ten times what a step with the largest picture takes
 
 
@@ -126,7 +127,7 @@ class ResultRecord(msgspec.Struct, frozen=True, tag="result"):
     """The end of a run. `converged` is False for a run that met its cap: reported as censored, never dropped.
 
     `proof` says what `converged` means: the novice alone passed a lap of the layout it was taught on ("own"), or so
-    many fresh ones in a row ("fresh:3"). `contradictions` are labels that were set aside.
+    many fresh ones in a row ("fresh:3"); "none" if it was not tried. `contradictions` are labels that were set aside.
     """
 
     converged: bool

@@ -14,13 +14,13 @@ from typing import Any, TypeVar
 import zenoh
 
 from lira.hal.bus.access_log import Refusals
-from lira.hal.bus.attachment import attach
+from lira.hal.bus.attachment import attach as attached
 from lira.hal.bus.boundary import Boundary
 from lira.hal.bus.connection import Connection, Declared
 from lira.hal.bus.endpoint import DEFAULT_ROBOT, check_address, check_name, is_loopback
 from lira.hal.bus.expiry import Reminder
 from lira.hal.bus.keys import Keys, keys_from_environment, load_keys
-from lira.hal.bus.publisher import Publisher
+from lira.hal.bus.publisher import Attach, Publisher
 from lira.hal.bus.questions import Answer, Questions, ask_once
 from lira.hal.bus.reader import Reader, Tap
 from lira.hal.bus.topics import COMMANDS, Qos, Topic, named
@@ -113,18 +113,19 @@ class Bus:
         """What times on the bus are ahead of those of this process."""
         return self._time_base.offset_s
 
-    def publisher(self, topic: Topic[M], qos: Qos | None = None) -> Publisher[M]:
-        """Declare a publisher; `qos` replaces the table's."""
+    def publisher(self, topic: Topic[M], qos: Qos | None = None, attach: Attach | None = None) -> Publisher[M]:
+        """Declare a publisher; `qos` replaces the table's, `attach` what is attached: for who speaks for others."""
         key = self._key(self._own(topic).key)
         base = self._time_base
-        beside = partial(attach, self.epoch, self._counts.setdefault(key, itertools.count(1)), base)
-        return Publisher(self._connection, key, topic, qos or topic.qos, beside, base)
+        own = partial(attached, self.epoch, self._counts.setdefault(key, itertools.count(1)), base)
+        return Publisher(self._connection, key, topic, qos or topic.qos, attach or own, base)
 
     def put_raw(self, topic: Topic[Any], payload: bytes, attachment: bytes | None = None) -> None:
         """Send bytes as they are: for relays, recorders and tests of what a bus has to bear."""
         self._session.put(
             self._key(self._own(topic).key),
             payload,
+            encoding=zenoh.Encoding.APPLICATION_CDR.with_schema(topic.ros_type),
             attachment=attachment,
             priority=topic.qos.priority,
             congestion_control=zenoh.CongestionControl.DROP,

@@ -56,6 +56,12 @@ class Publisher(Generic[M]):
         Raises `BusError` when the session is closed, `CodecError` for what ROS cannot hold.
         """
         payload = encode(shifted(message, self._base.offset_s))
+        self.put_encoded(payload, time_s, seq=seq, answers=answers, released=released)
+
+    def put_encoded(
+        self, payload: bytes, time_s: float, *, seq: int | None = None, answers: int = -1, released: bool = False
+    ) -> None:
+        """As `put`, for a message that is CDR already."""
         attachment = self._attach(time_s, seq, answers, released=released)
         if self._qos.latched:
             self._kept = payload, attachment

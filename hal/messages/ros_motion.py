@@ -1,9 +1,9 @@
 """Velocities and where they lead: Twist with and without a stamp, what was applied, odometry, IMU."""
 
-from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from lira.hal.messages import Applied, Imu, Odometry, Reason, Source, Twist, TwistStamped
 from lira.hal.messages.description import BASE, IMU_LINK, ODOM_FRAME
@@ -15,9 +15,10 @@ _PoseWithCovariance = ros("geometry_msgs/msg/PoseWithCovariance")
 _TwistWithCovariance = ros("geometry_msgs/msg/TwistWithCovariance")
 
 UNMEASURED = 1e6  # variance of what nothing here measures: any value is as good
-# Nobody measures height, roll and pitch, nor how the wheels slip to the side.
-_POSE_VARIANCES = (0.0, 0.0, UNMEASURED, UNMEASURED, UNMEASURED, 0.0)
-_TWIST_VARIANCES = (0.0, 1e-4, UNMEASURED, UNMEASURED, UNMEASURED, 0.0)
+SIDEWAYS = 1e-4  # wheels do not slip to the side by more than a centimetre a second
+# Nobody measures height, roll and pitch.
+_POSE = np.diag([0.0, 0.0, UNMEASURED, UNMEASURED, UNMEASURED, 0.0]).reshape(-1)
+_TWIST = np.diag([0.0, SIDEWAYS, UNMEASURED, UNMEASURED, UNMEASURED, 0.0]).reshape(-1)
 # The gyroscope integrates the yaw; roll and pitch nobody knows. Gravity is what a level floor makes of it.
 _IMU_ORIENTATION = np.diag([UNMEASURED, UNMEASURED, 0.1**2]).reshape(-1)
 _IMU_TURN = np.diag([0.05**2, 0.05**2, 0.02**2]).reshape(-1)
@@ -69,8 +70,9 @@ def _odometry_to(m: Odometry) -> Any:
     twist = twist_to(Twist(m.linear_m_s, m.angular_rad_s))
     pose_covariance = twist_covariance = _NO_COVARIANCE_36
     if (spread := m.spread) is not None:
-        pose_covariance = _covariance(_POSE_VARIANCES, {0: spread.position_m, 1: spread.position_m, 5: spread.yaw_rad})
-        twist_covariance = _covariance(_TWIST_VARIANCES, {0: spread.linear_m_s, 5: spread.angular_rad_s})
+        pose_covariance = _covariance(_POSE, spread.position_m, spread.yaw_rad)
+        pose_covariance[7] = pose_covariance[0]  # y as x
+        twist_covariance = _covariance(_TWIST, spread.linear_m_s, spread.angular_rad_s)
     return ros("nav_msgs/msg/Odometry")(
         header(m.stamp_s, ODOM_FRAME),
         BASE,
@@ -79,13 +81,11 @@ def _odometry_to(m: Odometry) -> Any:
     )
 
 
-def _covariance(variances: tuple[float, ...], deviations: Mapping[int, float]) -> Any:
+def _covariance(template: NDArray[np.float64], position: float, turn: float) -> NDArray[np.float64]:
     """Six by six, row by row, with nothing but the diagonal: what goes together with what, nobody knows."""
-    matrix = np.zeros((len(variances), len(variances)))
-    np.fill_diagonal(matrix, variances)
-    for at, deviation in deviations.items():
-        matrix[at, at] = deviation**2
-    return matrix.reshape(-1)
+    matrix = template.copy()
+    matrix[0], matrix[35] = position**2, turn**2
+    return matrix
 
 
 def _odometry_from(message: Any) -> Odometry:

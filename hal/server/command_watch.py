@@ -3,7 +3,6 @@
 A peer of ours knows the rules. One that publishes on `cmd_vel` with ROS's tools does not, and sees the robot stand.
 """
 
-import threading
 from collections import deque
 from dataclasses import dataclass, field
 from itertools import pairwise
@@ -45,37 +44,36 @@ class _Stream:
 
 
 class CommandWatch:
-    """Fed by the thread that reads commands, read by the one that reports."""
+    """Fed by the thread that moves the wheels, read by the one that reports. No lock: the first waits for nobody.
+
+    Copies of dictionaries and deques are whole, since nothing runs in between that makes one.
+    """
 
     def __init__(self) -> None:
         self._streams: dict[tuple[str, str], _Stream] = {}
         self._commanded_s: dict[str, float] = {}
-        self._lock = threading.Lock()
 
     def note_sender(self, sender: str, now_s: float) -> None:
         """Somebody commands; `sender` is the id of the session, "" if it is not known."""
-        with self._lock:
-            self._commanded_s.pop(sender, None)
-            self._commanded_s[sender] = now_s
-            if len(self._commanded_s) > MOST:
-                del self._commanded_s[next(iter(self._commanded_s))]
+        self._commanded_s.pop(sender, None)
+        self._commanded_s[sender] = now_s
+        if len(self._commanded_s) > MOST:
+            del self._commanded_s[next(iter(self._commanded_s))]
 
     def note_ros(self, key: str, sender: str, timeout_s: float, noted: Noted) -> None:
         """A ROS peer commands on a topic, where each command counts for `timeout_s`."""
-        with self._lock:
-            if len(self._streams) >= MOST and (key, sender) not in self._streams:
-                del self._streams[next(iter(self._streams))]
-            self._streams.setdefault((key, sender), _Stream(timeout_s)).noted.append(noted)
+        if len(self._streams) >= MOST and (key, sender) not in self._streams:
+            del self._streams[next(iter(self._streams))]
+        self._streams.setdefault((key, sender), _Stream(timeout_s)).noted.append(noted)
 
     def commanders(self, now_s: float) -> frozenset[str]:
         """The sessions that commanded lately."""
-        with self._lock:
-            return frozenset(sender for sender, at_s in self._commanded_s.items() if now_s - at_s < RECENT_S)
+        return frozenset(sender for sender, at_s in self._commanded_s.copy().items() if now_s - at_s < RECENT_S)
 
     def advice(self, now_s: float, *, armed: bool) -> tuple[str, ...]:
         """What to tell those whose commands do not drive now, each with the remedy."""
-        with self._lock:
-            streams = [(key, stream.timeout_s, list(stream.noted)) for (key, _), stream in self._streams.items()]
+        copied = self._streams.copy()
+        streams = [(key, stream.timeout_s, list(stream.noted.copy())) for (key, _), stream in copied.items()]
         told = (_advice(key, timeout_s, noted, now_s, armed=armed) for key, timeout_s, noted in streams)
         return tuple(dict.fromkeys(each for each in told if each))
 

@@ -18,6 +18,7 @@ OK, WARN = 0, 1
 WAITING = (State.DISARMED, State.STOPPED)  # for a neutral command
 PATIENCE_S = 3.0  # a peer that has just come has one link for a moment
 NO_DATAGRAMS = "UDP does not get through: over TCP alone commands queue up in a gap of the radio (check the firewall)"
+CLIENT = "who hear the robot alone: a bridge or viewer that connects as a client hears all"
 CROWD = "no more files may be opened, so nobody can connect: does somebody hold connections open? (see ulimit -n)"
 NO_TWIST = "what comes on '{key}' is neither geometry_msgs/Twist nor TwistStamped"
 CLOCK_OFF_S = 0.5
@@ -136,9 +137,11 @@ class Reporter:
         )
 
     def _link(self, trouble: str) -> DiagnosticStatus:
+        short = self._bus.short_peers()
         values = (
             ("links", str(self._bus.links())),
             ("peers", str(self._bus.peers())),
+            *((("peers with one link", f"{short}, {CLIENT}"),) if short else ()),
             ("encrypted", str(self._bus.encrypted).lower()),
             *((f"refused {kind}", str(count)) for kind, count in self._bus.refusals.counts.items()),
         )

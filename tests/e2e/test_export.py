@@ -7,13 +7,13 @@ import uuid
 import numpy as np
 import pyarrow.parquet as pq
 import pytest
+from rerun.chunk import RrdReader
 
 from lira.fusion.log.label_log import read_demonstrations
 from lira.fusion.modalities.image import gray_image
 from lira.hal.messages import Image
 from lira.tools.cli import main
 from lira.tools.export.columns import SCAN
-from lira.tools.export.pictures import pictures_of, size_of
 from lira.tools.export.run import load_run
 from lira.tools.launch.processes import ChildProcess, free_port, lira_command
 
@@ -66,9 +66,10 @@ def test_what_the_learner_saw_is_in_the_data_set(run):
     labels = {(each.observation, each.source, each.novice): each for each in read_demonstrations(found.labels)}
     assert len(labels) > 20
     met = 0
+    pictures = found.pictures.of(step for table in found.tables for step in table.episode.steps)
     for table in found.tables:
-        steps = table.episode.steps
-        for number, (step, picture) in enumerate(zip(steps, pictures_of(steps, size_of(steps)), strict=True)):
+        for number, step in enumerate(table.episode.steps):
+            picture = next(pictures)
             decision = step.decision
             label = labels.get((decision.observation, decision.driver, decision.novice))
             if label is None:
@@ -79,6 +80,15 @@ def test_what_the_learner_saw_is_in_the_data_set(run):
             assert (table[SCAN].values[number] == label.features.scan).all()
             assert (gray_image(Image(0.0, picture), label.features.image.shape[0]) == label.features.image).all()
     assert met > 0.95 * len(labels)  # decisions travel by a topic that may lose some
+
+
+def test_rerun_gets_a_file_of_it(run, tmp_path):
+    file = tmp_path / "run.rrd"
+    with ChildProcess("view", lira_command("view", str(run), "--rerun", str(file)), tmp_path / "view.log") as view:
+        assert view.wait(60.0) == 0, view.output()
+    paths = {chunk.entity_path for chunk in RrdReader(file).stream()}
+    assert {"/world/scan", "/world/camera", "/who/drives", "/activation/experts/camera"} <= paths
+    assert [path for path in paths if "visual_geometries/base_link" in path]
 
 
 def test_the_data_set_goes_out_and_comes_back(run, tmp_path, capsys):

@@ -134,6 +134,8 @@ def test_a_viewer_with_one_link_raises_no_alarm_and_who_commands_over_one_does(s
 
     wait_for(lambda: robot._bus.short_peers() == 1)
     assert set(levels(5)) == {OK}
+    link = next(each for each in told.newest().message.status if each.name.endswith("link"))
+    assert "connects as a client hears all" in dict(link.values)["peers with one link"]
     until_s = time.monotonic() + 15.0
     while levels(1)[-1] != WARN:
         assert time.monotonic() < until_s

@@ -18,7 +18,7 @@ OF_PROCESSES = "import subprocess\n"
 
 
 def run_pytest(folder, *words, ci=False):
-    for name in ("kinds.py", "loopback.py"):
+    for name in ("foreign.py", "kinds.py", "loopback.py"):
         shutil.copy(CONFTEST.with_name(name), folder)
     environment = {name: value for name, value in os.environ.items() if name != "CI"} | ({"CI": "true"} if ci else {})
     return subprocess.run(

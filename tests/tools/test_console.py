@@ -32,6 +32,7 @@ from lira.hal.messages import (
 from lira.hal.profile import load_profile
 from lira.tools.bench.parts import null_robot
 from lira.tools.bench.takeover import policy
+from lira.tools.cli import main
 from lira.tools.console import sound
 from lira.tools.console.keyboard import keyboard_mapping, pad_of
 from lira.tools.console.picture import pixels_of
@@ -47,9 +48,10 @@ from lira.tools.operator.voice import Voice, verdict, vocabulary
 os.environ["SDL_VIDEODRIVER"] = os.environ["SDL_AUDIODRIVER"] = "dummy"
 
 pygame = pytest.importorskip("pygame", reason="needs pygame: pip install 'lira-rosbot[console]'")
+from lira.tools.console.canvas import Canvas, fitted  # noqa: E402
 from lira.tools.console.draw import BANNER, COLOURS, SIZE, draw, draw_voice, fan  # noqa: E402
 from lira.tools.console.palette import AMBER, GREEN, PANEL, RED, SKY  # noqa: E402
-from lira.tools.console.screen import check_screen, fitted, window_size  # noqa: E402
+from lira.tools.console.screen import check_screen, window_size  # noqa: E402
 from lira.tools.console.window import Keyboard  # noqa: E402
 
 SCAN = LaserScan(1.0, -math.pi / 2, math.pi / 4, 0.1, 4.0, np.array([1.0, math.inf, 2.0, math.nan, 1.0], np.float32))
@@ -125,7 +127,7 @@ def test_all_words_fit_into_the_banner(situation):
     words = vocabulary("en")[situation]
     surface = pygame.Surface(SIZE)
     surface.fill((1, 2, 3))
-    draw_voice(surface, BANNER, Voice(situation, URGENCY[situation], words.who, words.why, words.now))
+    draw_voice(Canvas(surface), BANNER, Voice(situation, URGENCY[situation], words.who, words.why, words.now))
     pixels = pygame.surfarray.array3d(surface)
     pixels[BANNER.x : BANNER.right, BANNER.y : BANNER.bottom] = (1, 2, 3)
     assert share_of(pixels, (1, 2, 3)) == 1.0
@@ -351,7 +353,9 @@ def test_the_screenshot_is_made_without_a_screen_and_without_a_robot(tmp_path):
     assert pygame.image.load(str(path)).get_size() == SIZE
 
 
-def test_a_screenshot_that_cannot_be_written_is_an_error_of_two_lines(tmp_path):
+def test_a_screenshot_that_cannot_be_written_is_an_error_of_two_lines(tmp_path, capsys):
+    assert main(["console", "--screenshot", str(tmp_path / "console.jpg")]) == 2
+    assert "is no .png" in capsys.readouterr().err
     path = tmp_path / "nowhere" / "console.png"
     with ChildProcess("the console", lira_command("console", "--screenshot", str(path)), tmp_path / "log") as console:
         assert console.wait(60.0) == 2, console.output()
@@ -369,6 +373,21 @@ def test_a_screenshot_that_cannot_be_written_is_an_error_of_two_lines(tmp_path):
 )
 def test_the_console_is_whole_on_any_screen(window, box):
     assert tuple(fitted(SIZE, window)) == pytest.approx(box, abs=1)
+
+
+def test_letters_and_lines_are_drawn_for_the_window_and_not_enlarged():
+    """Twice as large, the edges of letters are as thin as before: enlarged pixels would make them twice as wide."""
+
+    def blurred(size):
+        pygame.font.init()
+        surface = pygame.Surface(size)
+        draw(surface, VIEW)
+        gray = pygame.surfarray.array3d(surface).mean(axis=-1)
+        edges = np.abs(np.diff(gray, axis=0)) > 10
+        return np.mean(edges[:-1] & edges[1:]) / np.mean(edges)
+
+    small, large = blurred(SIZE), blurred((2 * SIZE[0], 2 * SIZE[1]))
+    assert large < small
 
 
 def test_it_begins_no_larger_than_the_desktop():

@@ -7,12 +7,13 @@ import pytest
 from pad_bed import SONY, Bed, library
 
 from lira.fusion.log.label_log import read_demonstrations
-from lira.fusion.log.run_log import RunRecord, StepRecord, read_run
+from lira.fusion.log.run_log import ResultRecord, RunRecord, StepRecord, read_run
 from lira.hal.bus.bus import Bus
 from lira.hal.bus.topics import APPLIED, DECISION, OPERATOR_ANSWER, SIM_STATE
 from lira.hal.messages import STOP, Source
 from lira.tools.bench import takeover
 from lira.tools.launch.processes import ChildProcess, free_port, lira_command
+from lira.tools.report import write_report
 
 if library() is None:
     pytest.skip("needs libumockdev (Debian package umockdev)", allow_module_level=True)
@@ -114,9 +115,16 @@ def test_a_press_takes_control_from_the_learner_which_labels_it(bed, hand, watch
     demonstrations = list(read_demonstrations(tmp_path / "run" / "labels.lira"))
     by_hand = [d.action for d in demonstrations if d.source == "human"]
     assert by_hand == [pytest.approx((0.5, 0.0), abs=0.02)] * len(by_hand)  # without the frames before the stick moved
-    head = next(read_run(tmp_path / "run" / "run.jsonl"))
+    head, *steps, result = read_run(tmp_path / "run" / "run.jsonl")
     assert isinstance(head, RunRecord)
     assert (head.world, head.method, head.idle_frames) == ("line", "lira", "skip")
+    assert all(step.state is not None for step in steps)  # a twin tells where the robot was
+    assert isinstance(result, ResultRecord)
+    assert (result.proof, result.demonstration) == ("none", len(by_hand))
+    page = write_report(tmp_path / "run").read_text(encoding="utf-8")
+    assert "nothing was proven" in page
+    assert "Where it drove" in page
+    assert "only a twin knows" not in page
     assert (tmp_path / "run" / "novice.safetensors").is_file()
 
 

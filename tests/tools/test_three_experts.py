@@ -11,6 +11,7 @@ from lira.fusion.log.run_log import RunRecord, RunWriter, read_run
 from lira.fusion.methods.presets import METHODS
 from lira.hal.profile import load_profile
 from lira.tools.console import draw
+from lira.tools.console.canvas import Canvas
 from lira.tools.console.sample import sample_view
 from lira.tools.report import write_report
 from lira.tools.report.digest import load_run
@@ -61,10 +62,10 @@ def test_the_console_draws_a_row_for_each(record, monkeypatch):
     pygame = pytest.importorskip("pygame")
     pygame.init()
     written = {}
-    monkeypatch.setattr(draw, "write", lambda _, words, at, *_rest, **_more: written.setdefault(words, at))
+    monkeypatch.setattr(Canvas, "write", lambda _, words, at, *_rest, **_more: written.setdefault(words, at))
     box = pygame.Rect(0, 0, 720, 330)
     decision = list(read_run(record))[-1].decision
-    draw.draw_actions(pygame.Surface(box.size), box, replace(sample_view(), decision=decision))
+    draw.draw_actions(Canvas(pygame.Surface(box.size)), box, replace(sample_view(), decision=decision))
     names = ["camera", "lidar", "wall", "novice", "drives"]
     rows = [written[name][1] for name in names]
     assert all(below - above >= 30 for above, below in pairwise(rows))  # none on another

@@ -191,6 +191,7 @@ def test_who_only_looks_can_stop_and_the_driver_can_release(robot, page, applied
 SIZES = {
     "phone": (390, 844),
     "phone lying": (844, 390),
+    "tablet": (820, 1180),
     "netbook": (1024, 600),
     "laptop": (1366, 768),
     "4K": (3840, 2160),
@@ -212,6 +213,45 @@ def test_on_every_screen_all_that_is_needed_is_in_reach(page, size):
             assert -1 <= box["top"] <= box["bottom"] <= height + 1, name
     finally:
         page.execute_cdp_cmd("Emulation.clearDeviceMetricsOverride", {})
+
+
+CONTRAST = """
+const linear = (v) => v <= 0.04045 ? v / 12.92 : ((v + 0.055) / 1.055) ** 2.4;
+const luminance = (colour) => {
+  const [r, g, b] = colour.match(/[\\d.]+/g).map((v) => linear(v / 255));
+  return 0.2126 * r + 0.7152 * g + 0.0722 * b;
+};
+const behind = (element) => {
+  const colour = getComputedStyle(element).backgroundColor;
+  return element === document.documentElement || !/, 0\\)$/.test(colour) ? colour : behind(element.parentElement);
+};
+const contrast = (element) => {
+  const [one, other] = [getComputedStyle(element).color, behind(element)].map(luminance).sort((a, b) => a - b);
+  return (other + 0.05) / (one + 0.05);
+};
+const found = {};
+const said = ["#who", "#why", "#now", "#stop b", "figcaption", "h2", "#drive", "#link", ".none", "#deadman small"];
+for (const urgency of ["idle", "calm", "watch", "ask", "need", "alarm"]) {
+  document.body.dataset.urgency = urgency;
+  for (const selector of said) found[`${urgency} ${selector}`] = contrast(document.querySelector(selector));
+}
+document.querySelector("#turbo").classList.add("held");
+found["held"] = contrast(document.querySelector("#turbo b"));
+document.querySelector("#turbo").classList.remove("held");
+return found;
+"""
+
+
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+def test_letters_can_be_read_in_daylight_and_in_the_dark(page, scheme):
+    """WCAG AA: 4.5 to 1, for whatever is said and however loud."""
+    features = [{"name": "prefers-color-scheme", "value": scheme}]
+    page.execute_cdp_cmd("Emulation.setEmulatedMedia", {"features": features})
+    try:
+        found = page.execute_script(CONTRAST)
+    finally:
+        page.execute_cdp_cmd("Emulation.setEmulatedMedia", {"features": []})
+    assert {name: ratio for name, ratio in found.items() if ratio < 4.5} == {}
 
 
 def test_the_page_shows_pictures_soon_and_without_an_error(page):

@@ -5,6 +5,7 @@ import math
 import pygame
 
 from lira.hal.messages import Action, ExpertView, LaserScan
+from lira.tools.console.canvas import Canvas
 from lira.tools.console.palette import (
     AMBER,
     BACK,
@@ -17,9 +18,6 @@ from lira.tools.console.palette import (
     SKY,
     TEXT,
     WHITE,
-    panel,
-    write,
-    write_lines,
 )
 from lira.tools.console.picture import pixels_of
 from lira.tools.operator.situation import CORNERS, Urgency
@@ -40,49 +38,53 @@ BANNER = pygame.Rect(560, 16, 704, 176)
 
 
 def draw(surface: pygame.Surface, view: View) -> None:
-    """The whole console, for a surface of `SIZE`."""
-    surface.fill(BACK)
-    draw_camera(surface, pygame.Rect(16, 16, 528, 330), view)
-    draw_scan(surface, pygame.Rect(16, 358, 528, 260), view)
-    draw_voice(surface, BANNER, speak(view))
-    draw_actions(surface, pygame.Rect(560, 204, 704, 246), view)
-    draw_counts(surface, pygame.Rect(560, 460, 704, 94), view)
-    draw_operator(surface, pygame.Rect(560, 564, 704, 54), view)
-    draw_status(surface, pygame.Rect(16, 628, 1248, 40), view)
+    """The whole console, as large as fits on a surface."""
+    canvas = Canvas.fitted(surface, SIZE)
+    canvas.fill(BACK)
+    draw_camera(canvas, pygame.Rect(16, 16, 528, 330), view)
+    draw_scan(canvas, pygame.Rect(16, 358, 528, 260), view)
+    draw_voice(canvas, BANNER, speak(view))
+    draw_actions(canvas, pygame.Rect(560, 204, 704, 246), view)
+    draw_counts(canvas, pygame.Rect(560, 460, 704, 94), view)
+    draw_operator(canvas, pygame.Rect(560, 564, 704, 54), view)
+    draw_status(canvas, pygame.Rect(16, 628, 1248, 40), view)
 
 
-def draw_camera(surface: pygame.Surface, box: pygame.Rect, view: View) -> None:
+def draw_camera(canvas: Canvas, box: pygame.Rect, view: View) -> None:
     """The camera's picture, as large as fits; hatched out when it is stale."""
-    panel(surface, box, "camera")
+    panel(canvas, box, "camera")
     pixels = None if view.picture_age_s > STALE_S else pixels_of(view.picture)
     if pixels is None:
-        write(surface, "no picture", box.center, 28, DIM, centre=True)
+        canvas.write("no picture", box.center, 28, DIM, centre=True)
         return
     height, width = pixels.shape[:2]
-    scale = min((box.width - 16) / width, (box.height - 36) / height)
-    size = (max(1, round(width * scale)), max(1, round(height * scale)))
     picture = pygame.image.frombuffer(pixels.tobytes(), (width, height), "RGB")
-    picture = pygame.transform.scale(picture, size)
-    surface.blit(picture, picture.get_rect(center=(box.centerx, box.centery + 10)))
+    canvas.picture(picture, (box.x + 8, box.y + 28, box.width - 16, box.height - 36))
 
 
-def draw_scan(surface: pygame.Surface, box: pygame.Rect, view: View) -> None:
+def panel(canvas: Canvas, box: pygame.Rect, title: str) -> None:
+    """A titled box."""
+    canvas.rect(PANEL, box, radius=6)
+    canvas.write(title, (box.x + 10, box.y + 8), 22, DIM)
+
+
+def draw_scan(canvas: Canvas, box: pygame.Rect, view: View) -> None:
     """What the learner sees of the scan: a fan ahead of the robot, near is bright."""
-    panel(surface, box, f"lidar, {math.degrees(view.fov_rad):.0f} degrees ahead, {view.max_range_m:g} m")
+    panel(canvas, box, f"lidar, {math.degrees(view.fov_rad):.0f} degrees ahead, {view.max_range_m:g} m")
     if view.scan is None or view.scan_age_s > STALE_S:
-        write(surface, "no scan", box.center, 28, DIM, centre=True)
+        canvas.write("no scan", box.center, 28, DIM, centre=True)
         return
     origin = (box.centerx, box.bottom - 18)
     reach_px = min(box.height - 50, (box.width / 2 - 12) / max(0.2, math.sin(min(view.fov_rad, math.pi) / 2)))
     points = fan(view.scan, view.fov_rad, view.max_range_m, origin, reach_px)
     if len(points) > 1:
-        pygame.draw.polygon(surface, (44, 62, 80), [origin, *(point for point, _ in points)])
-        pygame.draw.lines(surface, EDGE, False, [point for point, _ in points])
+        canvas.polygon((44, 62, 80), [origin, *(point for point, _ in points)])
+        canvas.lines(EDGE, [point for point, _ in points])
     for point, share in points:
         if share < 1.0:
-            pygame.draw.circle(surface, AMBER if share < 0.35 else SKY, point, 3)
+            canvas.circle(AMBER if share < 0.35 else SKY, point, 3)
     x, y = origin
-    pygame.draw.polygon(surface, TEXT, [(x, y - 12), (x - 8, y + 8), (x + 8, y + 8)])
+    canvas.polygon(TEXT, [(x, y - 12), (x - 8, y + 8), (x + 8, y + 8)])
 
 
 def fan(
@@ -97,39 +99,39 @@ def fan(
     return points
 
 
-def draw_voice(surface: pygame.Surface, box: pygame.Rect, voice: Voice) -> None:
+def draw_voice(canvas: Canvas, box: pygame.Rect, voice: Voice) -> None:
     """Who drives, why, and what to do now. What needs a person fills the box and has a sign; the rest has a bar."""
     (colour, ink), corners = COLOURS[voice.urgency], CORNERS.get(voice.urgency, 0)
-    pygame.draw.rect(surface, colour if corners else PANEL, box, border_radius=6)
+    canvas.rect(colour if corners else PANEL, box, radius=6)
     left = box.x + (112 if corners else 26)
     if corners:
-        draw_sign(surface, (box.x + 56, box.y + 62), corners, ink, colour)
+        draw_sign(canvas, (box.x + 56, box.y + 62), corners, ink, colour)
     else:
-        pygame.draw.rect(surface, colour, (box.x, box.y, 10, box.height), border_radius=4)
-    write(surface, voice.who, (left, box.y + 12), 48, ink)
+        canvas.rect(colour, (box.x, box.y, 10, box.height), radius=4)
+    canvas.write(voice.who, (left, box.y + 12), 48, ink)
     width = box.right - 16 - left
-    y = write_lines(surface, voice.why, (left, box.y + 56), 24, ink, width)
-    write_lines(surface, voice.now, (left, y + 10), 30, ink, width)
+    y = canvas.write_lines(voice.why, (left, box.y + 56), 24, ink, width)
+    canvas.write_lines(voice.now, (left, y + 10), 30, ink, width)
 
 
 def draw_sign(
-    surface: pygame.Surface, at: tuple[int, int], corners: int, ink: tuple[int, int, int], back: tuple[int, int, int]
+    canvas: Canvas, at: tuple[int, int], corners: int, ink: tuple[int, int, int], back: tuple[int, int, int]
 ) -> None:
     """A triangle to watch, a square to act, an octagon to stop."""
     x, y = at
     start = {3: -math.pi / 2, 4: math.pi / 4, 8: math.pi / 8}[corners]
     angles = [start + 2 * math.pi * k / corners for k in range(corners)]
-    pygame.draw.polygon(surface, ink, [(x + 36 * math.cos(a), y + 36 * math.sin(a)) for a in angles])
-    write(surface, "!", (x, y + 4), 44, back, centre=True)
+    canvas.polygon(ink, [(x + 36 * math.cos(a), y + 36 * math.sin(a)) for a in angles])
+    canvas.write("!", (x, y + 4), 44, back, centre=True)
 
 
-def draw_actions(surface: pygame.Surface, box: pygame.Rect, view: View) -> None:
+def draw_actions(canvas: Canvas, box: pygame.Rect, view: View) -> None:
     """Every expert's action and activation beside its threshold, then the novice's, the human's and what drove."""
-    panel(surface, box, "actions: turn and speed, each of the robot's limits; activation beside its threshold")
+    panel(canvas, box, "actions: turn and speed, each of the robot's limits; activation beside its threshold")
     decision = view.deciding
     if decision is None:
         idle = "paused" if view.paused else "nobody decides: start lira fusion" if view.linked else "no link"
-        write(surface, idle, box.center, 28, DIM, centre=True)
+        canvas.write(idle, box.center, 28, DIM, centre=True)
         return
     rows: list[tuple[str, Action, ExpertView | None]] = [(e.name, e.action, e) for e in decision.experts]
     rows.append(("novice", decision.novice, None))
@@ -140,74 +142,74 @@ def draw_actions(surface: pygame.Surface, box: pygame.Rect, view: View) -> None:
     for index, (name, action, expert) in enumerate(rows):
         y = box.y + 36 + index * step
         active = name == decision.driver or (expert is not None and expert.active)
-        write(surface, name, (box.x + 16, y + 6), 30, TEXT if active else DIM)
-        draw_bar(surface, pygame.Rect(box.x + 130, y + 4, 170, 22), -action[1], "turn")
-        draw_bar(surface, pygame.Rect(box.x + 320, y + 4, 170, 22), action[0], "speed")
+        canvas.write(name, (box.x + 16, y + 6), 30, TEXT if active else DIM)
+        draw_bar(canvas, pygame.Rect(box.x + 130, y + 4, 170, 22), -action[1], "turn")
+        draw_bar(canvas, pygame.Rect(box.x + 320, y + 4, 170, 22), action[0], "speed")
         if expert is not None:
-            draw_activation(surface, pygame.Rect(box.x + 510, y + 4, 178, 22), expert, decision.threshold)
+            draw_activation(canvas, pygame.Rect(box.x + 510, y + 4, 178, 22), expert, decision.threshold)
 
 
-def draw_bar(surface: pygame.Surface, box: pygame.Rect, value: float, name: str) -> None:
+def draw_bar(canvas: Canvas, box: pygame.Rect, value: float, name: str) -> None:
     """A value in [-1, 1] from the middle."""
-    pygame.draw.rect(surface, EDGE, box, 1)
+    canvas.rect(EDGE, box, 1)
     if math.isfinite(value):
         length = round(min(1.0, max(-1.0, value)) * (box.width / 2 - 2))
         left = min(box.centerx, box.centerx + length)
-        pygame.draw.rect(surface, SKY, (left, box.y + 3, max(2, abs(length)), box.height - 6))
-    pygame.draw.line(surface, TEXT, (box.centerx, box.y), (box.centerx, box.bottom))
-    write(surface, name, (box.x, box.bottom + 2), 18, DIM)
+        canvas.rect(SKY, (left, box.y + 3, max(2, abs(length)), box.height - 6))
+    canvas.lines(TEXT, [(box.centerx, box.y), (box.centerx, box.bottom)])
+    canvas.write(name, (box.x, box.bottom + 2), 18, DIM)
 
 
-def draw_activation(surface: pygame.Surface, box: pygame.Rect, expert: ExpertView, threshold: float) -> None:
+def draw_activation(canvas: Canvas, box: pygame.Rect, expert: ExpertView, threshold: float) -> None:
     """Activation up to three thresholds; the line is the threshold, and a dot says active."""
-    pygame.draw.rect(surface, EDGE, box, 1)
+    canvas.rect(EDGE, box, 1)
     full = max(3.0 * threshold, 1e-9)
     width = round(min(1.0, max(0.0, expert.activation / full)) * (box.width - 4))
-    pygame.draw.rect(surface, AMBER if expert.active else EDGE, (box.x + 2, box.y + 3, width, box.height - 6))
+    canvas.rect(AMBER if expert.active else EDGE, (box.x + 2, box.y + 3, width, box.height - 6))
     x = box.x + 2 + round((box.width - 4) / 3)
-    pygame.draw.line(surface, TEXT, (x, box.y - 3), (x, box.bottom + 3), 2)
+    canvas.lines(TEXT, [(x, box.y - 3), (x, box.bottom + 3)], 2)
     words = f"{expert.activation:.3f} of {threshold:.2f}" + (", active" if expert.active else "")
-    write(surface, words, (box.x, box.bottom + 2), 18, TEXT if expert.active else DIM)
+    canvas.write(words, (box.x, box.bottom + 2), 18, TEXT if expert.active else DIM)
 
 
-def draw_counts(surface: pygame.Surface, box: pygame.Rect, view: View) -> None:
+def draw_counts(canvas: Canvas, box: pygame.Rect, view: View) -> None:
     """Labels, interventions, calls and training so far."""
-    panel(surface, box, "so far" if view.teaching is None else progress_words(view.teaching))
+    panel(canvas, box, "so far" if view.teaching is None else progress_words(view.teaching))
     if view.decision is None:
         return
     d, labels = view.decision, view.decision.labels
     pairs = (
         ("human labels", labels.stored_human),
         ("expert labels", labels.stored_expert),
-        ("demonstration", labels.demonstration),
+        ("shown first", labels.demonstration),
         ("interventions", d.interventions),
         ("calls", d.calls),
         ("training steps", d.training_steps),
     )
     for index, (name, count) in enumerate(pairs):
         x = box.x + 16 + index * (box.width - 20) // len(pairs)
-        write(surface, str(count), (x, box.y + 30), 42, TEXT)
-        write(surface, name, (x, box.y + 70), 20, DIM)
+        canvas.write(str(count), (x, box.y + 30), 42, TEXT)
+        canvas.write(name, (x, box.y + 70), 20, DIM)
 
 
-def draw_operator(surface: pygame.Surface, box: pygame.Rect, view: View) -> None:
+def draw_operator(canvas: Canvas, box: pygame.Rect, view: View) -> None:
     """What became of the newest request, and which keys ask."""
-    pygame.draw.rect(surface, PANEL, box, border_radius=6)
+    canvas.rect(PANEL, box, radius=6)
     words, accepted = verdict(view)
     colour = DIM if accepted is None else GREEN if accepted else RED
-    pygame.draw.rect(surface, colour, (box.x, box.y, 10, box.height), border_radius=4)
+    canvas.rect(colour, (box.x, box.y, 10, box.height), radius=4)
     prefix = "" if accepted is None else "done: " if accepted else "no: "
-    write(surface, prefix + words, (box.x + 26, box.y + 8), 24, DIM if accepted is None else TEXT)
+    canvas.write(prefix + words, (box.x + 26, box.y + 8), 24, DIM if accepted is None else TEXT)
     names = () if view.decision is None else (expert.name for expert in view.decision.experts)
     keys = ["P " + ("go on" if view.paused else "pause"), "S save", "R held: new episode"]
     keys += ["V prove it", "U held: undo"] if view.teaching is not None else []
     keys += [f"{number} {name} drives" for number, name in enumerate(names, start=1)]
-    write(surface, "    ".join(keys), (box.x + 26, box.y + 32), 20, DIM)
+    canvas.write("    ".join(keys), (box.x + 26, box.y + 32), 20, DIM)
 
 
-def draw_status(surface: pygame.Surface, box: pygame.Rect, view: View) -> None:
+def draw_status(canvas: Canvas, box: pygame.Rect, view: View) -> None:
     """Link, speed, battery, emergency stop, keyboard."""
-    pygame.draw.rect(surface, PANEL, box, border_radius=6)
+    canvas.rect(PANEL, box, radius=6)
     late = view.link_age_s > STALE_S
     link = "link lost" if late else f"link {1e3 * view.link_age_s:.0f} ms"
     low = view.battery is not None and view.battery.voltage_v < LOW_V
@@ -224,6 +226,6 @@ def draw_status(surface: pygame.Surface, box: pygame.Rect, view: View) -> None:
         (speed, TEXT),
         (keys, DIM),
     )
-    x = box.x + 14
+    x: float = box.x + 14
     for words, colour in parts:
-        x += write(surface, words, (x, box.y + 11), 26, colour) + 30
+        x += canvas.write(words, (x, box.y + 11), 26, colour) + 30

@@ -1,6 +1,4 @@
-"""The window's size, whatever it is: the console is drawn in its own size and fitted in, whole and in proportion."""
-
-import pygame
+"""Whether there is a screen, and how large the window begins."""
 
 from lira.hal.errors import ConfigError
 
@@ -20,23 +18,3 @@ def window_size(size: tuple[int, int], desktop: tuple[int, int]) -> tuple[int, i
     """How large the window begins: the console's own size, or what of the desktop it fits into."""
     scale = min(1.0, desktop[0] / size[0], desktop[1] / size[1])
     return round(size[0] * scale), round(size[1] * scale)
-
-
-def fitted(size: tuple[int, int], window: tuple[int, int]) -> pygame.Rect:
-    """Where in a window a picture of this size goes: as large as it fits, in the middle."""
-    scale = min(window[0] / size[0], window[1] / size[1])
-    box = pygame.Rect(0, 0, max(1, round(size[0] * scale)), max(1, round(size[1] * scale)))
-    box.center = (window[0] // 2, window[1] // 2)
-    return box
-
-
-def show_fitted(screen: pygame.Surface, picture: pygame.Surface) -> None:
-    """Put a picture on the screen: whole multiples pixel by pixel, and all else smoothed."""
-    box = fitted(picture.get_size(), screen.get_size())
-    if box.size == picture.get_size():
-        screen.blit(picture, box)
-        return
-    whole = box.width % picture.get_width() == 0 and box.height % picture.get_height() == 0
-    scale = pygame.transform.scale if whole else pygame.transform.smoothscale
-    screen.fill((0, 0, 0))
-    screen.blit(scale(picture, box.size), box)

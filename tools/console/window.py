@@ -13,7 +13,7 @@ from lira.hal.messages import Request
 from lira.tools.console import sound
 from lira.tools.console.draw import SIZE, draw
 from lira.tools.console.keyboard import keyboard_mapping, pad_of
-from lira.tools.console.screen import check_screen, show_fitted, window_size
+from lira.tools.console.screen import check_screen, window_size
 from lira.tools.joystick.axes import PadState
 from lira.tools.joystick.client import TeleopClient
 from lira.tools.joystick.deadman import Hand, State
@@ -111,7 +111,6 @@ def show(look: Callable[[], View], keyboard: Keyboard | None, stop: threading.Ev
         check_screen(pygame.display.get_driver(), os.environ.get("SDL_VIDEODRIVER"))
         desktop = pygame.display.get_desktop_sizes()[0]
         screen = pygame.display.set_mode(window_size(SIZE, desktop), pygame.RESIZABLE)
-        picture = pygame.Surface(SIZE, depth=32)
         pygame.display.set_caption("lira console")
         pressed: frozenset[str] = frozenset()
         loud, due_s = Urgency.CALM, time.monotonic()
@@ -135,8 +134,7 @@ def show(look: Callable[[], View], keyboard: Keyboard | None, stop: threading.Ev
             if urgency is not loud and urgency in sounds:
                 sounds[urgency].play()
             loud = urgency
-            draw(picture, view)
-            show_fitted(screen, picture)
+            draw(screen, view)
             pygame.display.flip()
             due_s = max(due_s + 1.0 / FPS, time.monotonic())
             time.sleep(max(0.0, due_s - time.monotonic()))

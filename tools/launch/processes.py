@@ -78,7 +78,7 @@ class ChildProcess:
             raise StorageError(f"cannot write {log}: {error.strerror}", "Choose another folder.") from error
         with output:
             self._process = subprocess.Popen(
-                _with_parent(command),
+                dying_with_parent(command),
                 stdin=subprocess.DEVNULL,
                 stdout=output,
                 stderr=subprocess.STDOUT,
@@ -166,7 +166,7 @@ def how_ended(status: int | None) -> str:
     return f"signal {signal.Signals(-status).name}" if status is not None and status < 0 else f"status {status}"
 
 
-def _with_parent(command: Sequence[str]) -> list[str]:
+def dying_with_parent(command: Sequence[str]) -> list[str]:
     """Return the command line that ends with this process, where the system knows how and this thread stays."""
     if sys.platform != "linux" or threading.current_thread() is not threading.main_thread():
         return list(command)

@@ -27,7 +27,7 @@ class Before:
     layouts: frozenset[int] = field(default_factory=frozenset)
 
 
-def sum_up(records: Iterable[Record], head: RunRecord) -> Before:
+def sum_up(records: Iterable[Record], head: RunRecord | None = None) -> Before:
     """Sum up a record. Raises `ConfigError` if it is of another method or robot than `head` says."""
     newest: Decision | None = None
     account, laps, layouts = NOTHING, list[LapRecord](), set[int]()
@@ -45,7 +45,7 @@ def sum_up(records: Iterable[Record], head: RunRecord) -> Before:
             case ResultRecord():
                 account = record.account
             case RunRecord():
-                if (record.preset, record.profile) != (head.preset, head.profile):
+                if head is not None and (record.preset, record.profile) != (head.preset, head.profile):
                     what = f"this folder was taught by '{record.preset}' on a '{record.profile}'"
                     raise ConfigError(what, "Go on with these, or choose another --run.")
     return Before(
@@ -60,6 +60,6 @@ def sum_up(records: Iterable[Record], head: RunRecord) -> Before:
     )
 
 
-def days_before(path: Path, head: RunRecord) -> Before:
+def days_before(path: Path, head: RunRecord | None = None) -> Before:
     """The same of a file, which may not be there yet."""
     return sum_up(read_run(path) if path.is_file() else (), head)

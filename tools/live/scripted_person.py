@@ -47,6 +47,7 @@ ACTIVE = 0.4  # so far from its cruise an expert reacts to something
 READY = "the scripted person is there"
 SEND_HZ = 30.0
 ANSWER_S = 60.0
+NEW_SHARE = 0.2  # of the newest look in how long a look is expected to take
 MOMENT = 3  # decisions that a novice is expected to go on in the same way
 ZEROS_S = 0.5
 STOPPED = frozenset({Reason.STALE, Reason.NEUTRAL_FIRST, Reason.REFUSED})
@@ -153,7 +154,7 @@ def ahead(state: CourseState, lag_s: float) -> CourseState:
 def live(controls: Controls, watch: Bus, person: Person, period_s: float, speed: float, stop: threading.Event) -> None:
     """Look and act, a period at a time, until the session is over; end it once it has passed."""
     states, decisions, sessions = watch.reader(SIM_STATE), watch.reader(DECISION), watch.reader(SESSION)
-    asked, proofs = False, 0
+    asked, proofs, thinks_s = False, 0, 0.0
     while not stop.wait(period_s / speed):
         state, session = states.newest(), sessions.newest()
         decision = decisions.newest()
@@ -171,9 +172,11 @@ def live(controls: Controls, watch: Bus, person: Person, period_s: float, speed:
                 controls.ask(Request.FINISH)
             asked, controls.action = True, None
             continue
-        lag_s = (time.monotonic() - state.arrived_s) * speed + period_s / 2
+        began_s = time.monotonic()
+        lag_s = (began_s - state.arrived_s + thinks_s) * speed + period_s / 2
         heard = decision.message if fresh and decision is not None else None
         controls.action = person.act(ahead(state.message, lag_s), heard, told)
+        thinks_s += NEW_SHARE * (time.monotonic() - began_s - thinks_s)
 
 
 def person_for(profile: RobotProfile, world: str, layout: int, skill: str, seed: int) -> Person:

@@ -3,7 +3,7 @@
 import math
 from collections.abc import Callable, Sequence
 
-from lira.fusion.log.run_log import ContradictionRecord, LapRecord, ResultRecord
+from lira.fusion.log.run_log import UNPROVEN, ContradictionRecord, LapRecord, ResultRecord
 
 HALVINGS = 60
 
@@ -24,6 +24,8 @@ def share_words(passed: int, laps: int, what: str = "unseen layouts") -> str:
 
 def proof_words(result: ResultRecord) -> str:
     """What the proving runs have shown."""
+    if result.proof == UNPROVEN:
+        return "taught by hand; nothing was proven: that takes lira teach"
     kind, _, count = result.proof.partition(":")
     passed, of, shown = count.partition("/")
     fresh = f"{passed} of {shown} fresh layouts" if of else f"{passed} fresh layouts in a row"

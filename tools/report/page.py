@@ -10,6 +10,7 @@ from statistics import median
 import cv2
 import numpy as np
 
+from lira.fusion.log.run_log import UNPROVEN
 from lira.hal.messages import Call, Driver, Phase
 from lira.tools.output.proven import contradiction_words, proof_words, unseen_words
 from lira.tools.report import plots
@@ -80,7 +81,8 @@ def outcome(run: Run) -> tuple[str, str]:
     if run.result is None:
         return "Cut off before its end", "bad"
     words = proof_words(run.result)
-    return f"{words[0].upper()}{words[1:]}", "good" if run.result.converged else "bad"
+    how = "good" if run.result.converged else "muted" if run.result.proof == UNPROVEN else "bad"
+    return f"{words[0].upper()}{words[1:]}", how
 
 
 def figures(run: Run) -> Iterable[tuple[str, str]]:

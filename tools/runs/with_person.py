@@ -8,12 +8,13 @@ from lira.fusion.experts.tasks import task_of
 from lira.fusion.learning.labels import Label
 from lira.fusion.log.label_log import DemonstrationLog, read_demonstrations
 from lira.fusion.log.recorder import Journal
-from lira.fusion.log.run_log import RunWriter
+from lira.fusion.log.run_log import UNPROVEN, ResultRecord, RunWriter
 from lira.fusion.operator_service import OperatorService
 from lira.fusion.service import serve
 from lira.hal.client.remote import RemoteRobot
 from lira.tools.launch.lifetime import saving, stop_or_interrupt
 from lira.tools.launch.notify import Notifier
+from lira.tools.live.before import days_before
 from lira.tools.operator.voice import explain
 from lira.tools.recording.beside import recorder_beside
 from lira.tools.runs.build import NewTrainer
@@ -31,6 +32,7 @@ def learn_from_person(
     head, folder = plan.head(profile, world), plan.folder
     notifier = Notifier.from_environment()
     assert folder is not None
+    before = days_before(folder / RECORD)
     # The log goes first: if it is damaged, nothing else is touched.
     with (
         DemonstrationLog(folder / LABELS, profile, mirrored=plan.preset.mirrored, say=say) as log,
@@ -45,7 +47,11 @@ def learn_from_person(
             for old in read_demonstrations(log.path):
                 if old.stored:
                     method.remember(Label(old.features, old.action, old.source, novice.weight(old.source)))
-            journal, loop = Journal(keep=log.append, write=record.write, publish=publish), ControlLoop(robot)
+            journal = Journal(keep=log.append, write=record.write, publish=publish)
+            if (newest := before.newest) is not None:
+                journal.ledger.go_on(newest.labels, newest.interventions, newest.calls, before.account)
+            loop = ControlLoop(robot, truth=None if robot.arena is None else robot.link.state)
+            began_s = robot.now()
             with stop_or_interrupt() as stop, request_line(robot, args) as line, hand_of(args) as hand:
                 service = OperatorService(
                     line,
@@ -76,4 +82,24 @@ def learn_from_person(
                         is_attended=lambda: hand.holds,
                         alive=notifier.alive,
                     )
+                record.write(_result(journal, service.episode, novice.training_steps, robot.now() - began_s))
     return 0
+
+
+def _result(journal: Journal, laps: int, training_steps: int, simulated_s: float) -> ResultRecord:
+    """What it came to. Nothing is proven here: that takes a session with an end."""
+    ledger = journal.ledger
+    return ResultRecord(
+        converged=False,
+        laps=laps,
+        human_labels=ledger.labels.stored_human,
+        demonstration=ledger.labels.demonstration,
+        interventions=ledger.interventions,
+        calls=ledger.calls,
+        buffer=ledger.buffer,
+        training_steps=training_steps,
+        simulated_s=simulated_s,
+        elapsed_s=journal.elapsed_s,
+        account=ledger.account,
+        proof=UNPROVEN,
+    )

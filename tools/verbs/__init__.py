@@ -42,11 +42,12 @@ GROUPS = {
         "joystick": "drive by hand: a gamepad on this machine, straight to the robot",
         "console": "watch the robot learn on a screen",
         "web": "watch, teach and drive the robot from a page in the browser",
-        "view": "show the robot in Foxglove, and its numbers to Prometheus; it only looks",
+        "view": "show the robot in Foxglove or Rerun, and its numbers to Prometheus; it only looks",
         "world": "draw a world from above and as the camera sees it",
     },
     ("records", "Records"): {
         "record": "record everything on a robot's bus, for later and for others' tools",
+        "play": "a recording on the bus again, or as a robot that takes commands",
         "info": "what a recording holds",
         "explain": "why the robot did what it did: of a recording, or now",
         "rerun": "put a recorded run through its method again: the same, or what would have been otherwise",

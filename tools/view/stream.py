@@ -1,4 +1,4 @@
-"""Hands what a source has to those who look, at an even pace, until it is told to end.
+"""Hands what a source has to those who look, at an even pace.
 
 A viewer that falls behind loses samples: each bounds what it keeps, and nothing waits for it. The process itself gives
 way to those that drive.
@@ -35,9 +35,9 @@ def give_way() -> None:
 
 
 def stream(source: Source, viewers: Sequence[Viewer], stop: threading.Event) -> None:
-    """Show the source to the viewers until `stop` is set. What is late is not caught up with."""
+    """Show the source to the viewers until it has ended or `stop` is set. What is late is not caught up with."""
     due_s = time.monotonic()
-    while not stop.is_set():
+    while not stop.is_set() and not source.ended:
         wanted = [frozenset(viewer.wanted()) for viewer in viewers]
         source.listen(frozenset[str]().union(*wanted))
         samples = source.poll()

@@ -14,6 +14,7 @@ import numpy as np
 
 from lira.hal.bus.bus import Bus
 from lira.hal.bus.topics import SCAN
+from lira.hal.clock import unix_offset_s
 from lira.hal.profile import load_profile
 from lira.robot.rplidar.decoders import DECODERS
 from lira.robot.rplidar.device import RPLidar
@@ -54,8 +55,9 @@ def live(mode: str, seconds: float) -> Row:
 
 
 def listen(robot: str, endpoint: str, seconds: float) -> list[tuple[float, float]]:
-    """Stamp and time of publication of every scan, once they come."""
+    """Stamp and time of publication of every scan, once they come, on the machine's clock."""
     bus = Bus(robot, connect=endpoint)
+    offset_s = unix_offset_s(time.monotonic)  # as the robot measured it
     reader = bus.reader(SCAN, depth=16)
     scans: list[tuple[float, float]] = []
     until_s = time.monotonic() + ARRIVAL_S
@@ -64,7 +66,7 @@ def listen(robot: str, endpoint: str, seconds: float) -> list[tuple[float, float
             if not scans:
                 until_s = time.monotonic() + seconds
             if received.attachment is not None:
-                scans.append((received.message.stamp_s, received.attachment.time_s))
+                scans.append((received.message.stamp_s - offset_s, received.attachment.time_s - offset_s))
         time.sleep(POLL_S)
     bus.close()
     return scans

@@ -8,6 +8,7 @@ examples:
   lira robot --lidar socket://rosbot:4001 --base socket://rosbot:4002 --camera http://rosbot:8080/stream
   lira robot --lidar /dev/ttyUSB0 --base /dev/ttyS1 --without camera
   lira robot --driver mylab.rover:Rover --profile my-rover.toml     a robot of your own
+  lira robot ... --ros2            offered to ROS 2 (rmw_zenoh), too: topics, transforms, commands
   lira twin --wire /tmp/wire       devices to try it on: it prints the words for this verb
 """
 
@@ -19,6 +20,7 @@ from typing import TYPE_CHECKING, cast
 from lira.hal.errors import ConfigError, PluginError
 from lira.tools.options import add_profile, add_server
 from lira.tools.output.troubles import watch
+from lira.tools.ros2.graph import add_graph, offered
 
 if TYPE_CHECKING:
     from lira.hal.bus.bus import Bus
@@ -54,6 +56,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add("--settings", type=Path, metavar="FILE", help="how this robot is mounted and calibrated (.toml)")
     add("--openni", type=Path, metavar="DIR", help="folder of OpenNI2's library (default: OPENNI2_REDIST)")
     add_server(parser)
+    add_graph(parser)
 
 
 def run(args: argparse.Namespace) -> int:
@@ -76,15 +79,16 @@ def run(args: argparse.Namespace) -> int:
         notifier.ready(words)
         watch(robot, stop)
 
-    serve(
-        robot,
-        args.name,
-        args.listen,
-        calibration=calibration,
-        insecure=args.insecure,
-        ready=ready,
-        alive=notifier.alive,
-    )
+    with offered(args):
+        serve(
+            robot,
+            args.name,
+            args.listen,
+            calibration=calibration,
+            insecure=args.insecure,
+            ready=ready,
+            alive=notifier.alive,
+        )
     return 0
 
 

@@ -10,6 +10,7 @@ examples:
   lira ros2 --connect rosbot:7447 --image rosbot-jazzy
   lira ros2 --image list                        which images are known
   lira ros2 --rmw --connect rosbot:7447 --domain 3
+  lira ros2 --offer --connect rosbot:7447       one of ours, offered to ROS (lira twin --ros2 starts this itself)
   lira ros2 --connect rosbot:7447 --namespace robot1 --topic odom=odometry/filtered --topic cmd_vel=base/cmd_vel
   lira drive lidar-expert
 """
@@ -66,6 +67,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="names, types, mounting and profile of a known ROS image, or of a .toml file; list: which there are",
     )
     add("--look", action="store_true", help="only list what comes there, and print the words that drive it")
+    add(
+        "--offer",
+        nargs="?",
+        const="",
+        metavar="HOST:PORT",
+        help="the other way round: offer the robot of ours at --connect to the graph of rmw_zenoh whose router is "
+        "there (without an address, or with own:HOST:PORT: be the router)",
+    )
     add("--rmw", action="store_true", help="its ROS runs rmw_zenoh, and no bridge is needed")
     add_ros_domain(parser, "with --rmw: the robot's ROS_DOMAIN_ID")
     add("--namespace", default="", help="namespace that the names of its topics begin with (default: none)")
@@ -102,6 +111,9 @@ def run(args: argparse.Namespace) -> int:
         print("\n".join(page(look(args.connect, LISTEN_S), args.connect)))
         return 0
 
+    if args.offer is not None:
+        return run_offer(args)
+
     from lira.hal.bus.bus import Bus
     from lira.hal.profile import load_profile
     from lira.hal.server.serve import serve
@@ -134,6 +146,23 @@ def run(args: argparse.Namespace) -> int:
             watch(robot, stop)
 
         serve(robot, args.name, args.listen, insecure=args.insecure, ready=ready, alive=notifier.alive)
+    return 0
+
+
+def run_offer(args: argparse.Namespace) -> int:
+    """Offer a robot of ours to ROS until told to stop."""
+    from lira.hal.server.server import stop_on_signal
+    from lira.tools.ros2.graph import graph_of
+    from lira.tools.ros2.offer import offer
+
+    graph = graph_of(args.offer, args.domain, args.namespace)
+
+    def ready() -> None:
+        first, *rest = graph.told()
+        print("\n".join([f"robot '{args.name}' is {first}", *rest]), flush=True)
+
+    with stop_on_signal() as stop:
+        offer(args.name, args.connect, graph, stop, ready)
     return 0
 
 

@@ -9,6 +9,7 @@ examples:
   lira twin --world my-track.toml             a world of your own: copy one of sim_backend/worlds
   lira twin --profile rosbot2 --speed 1.5     the ROSbot 2.0's sensors and wheels, 1.5 times real time
   lira twin --wire /tmp/wire --profile rosbot2  its devices, in the real ones' protocols, for `lira robot` to open
+  lira twin --ros2                            offered to ROS 2 (rmw_zenoh), too: topics, transforms, commands
   lira twin --lockstep                        time stands until the driver has answered: fast and repeatable
 """
 
@@ -22,6 +23,7 @@ from typing import TYPE_CHECKING
 
 from lira.hal.errors import ConfigError
 from lira.tools.options import add_layout, add_profile, add_seed, add_server, add_world
+from lira.tools.ros2.graph import add_graph, offered
 
 if TYPE_CHECKING:
     from lira.hal.bus.bus import Bus
@@ -43,6 +45,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_world(parser, "line")
     add_profile(parser, "thesis-sim")
     add_server(parser)
+    add_graph(parser)
     add_layout(parser, "which random layout of the world's boxes")
     add_seed(parser, "seeds the sensors' noise")
     pace = parser.add_mutually_exclusive_group()
@@ -86,6 +89,8 @@ def run(args: argparse.Namespace) -> int:
         raise ConfigError("--arena goes with --wire", "A twin that is a robot on the bus tells the truth there.")
     if args.lidar is not None and args.wire is None:
         raise ConfigError("--lidar goes with --wire", "A twin that is a robot on the bus has its profile's lidar.")
+    if args.ros2 is not None and (args.lockstep or args.wire is not None):
+        raise ConfigError("--ros2 is for a robot on the bus in real time", "Leave out --lockstep or --wire.")
     if args.wire is not None:
         return run_wire(args, profile, world)
 
@@ -107,17 +112,18 @@ def run(args: argparse.Namespace) -> int:
         if not args.lockstep:  # there the driver tells how it goes
             threading.Thread(target=report, args=(twin, bus, stop), daemon=True, name="status").start()
 
-    serve(
-        twin,
-        args.name,
-        args.listen,
-        arena=twin,
-        arena_info=twin.info,
-        lockstep=args.lockstep,
-        insecure=args.insecure,
-        ready=ready,
-        alive=notifier.alive,
-    )
+    with offered(args):
+        serve(
+            twin,
+            args.name,
+            args.listen,
+            arena=twin,
+            arena_info=twin.info,
+            lockstep=args.lockstep,
+            insecure=args.insecure,
+            ready=ready,
+            alive=notifier.alive,
+        )
     return 0
 
 

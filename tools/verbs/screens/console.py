@@ -14,6 +14,7 @@ examples:
 import argparse
 from pathlib import Path
 
+from lira.hal.errors import ConfigError
 from lira.tools.options import add_client
 
 
@@ -33,6 +34,8 @@ def run(args: argparse.Namespace) -> int:
     from lira.tools.console.window import Keyboard, save_picture, show
 
     if args.screenshot is not None:
+        if args.screenshot.suffix.lower() != ".png":
+            raise ConfigError(f"{args.screenshot} is no .png", "Give the file's name that ending.")
         from lira.tools.console.sample import sample_view
 
         save_picture(sample_view(), str(args.screenshot))

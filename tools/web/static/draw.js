@@ -150,6 +150,18 @@ export function showCounts(list, counts, words) {
   return undefined;
 }
 
+// The learning curve of a session: what share of each lap was driven without the person. Full height is all of it.
+export function drawLaps(canvas, shares) {
+  const { pen, width, height } = begin(canvas);
+  const step = Math.min(28, width / shares.length);
+  shares.forEach((share, index) => {
+    pen.fillStyle = colour("rule");
+    pen.fillRect(index * step, 0, 0.75 * step, height);
+    pen.fillStyle = colour("bar");
+    pen.fillRect(index * step, height * (1 - share), 0.75 * step, height * share);
+  });
+}
+
 // Labels over time: a curve that goes flat is a person who is needed less.
 export class Curve {
   constructor() { this.points = []; this.due = 0; }

@@ -2,6 +2,8 @@
 // same words. Nothing here decides who drives: lira web does, and lets go when this page is silent, late or away.
 
 const SAY_MS = 40; // three that do not come, and the hand is gone
+const PRESS_MS = 1300; // so long a button counts as held that was pressed by Enter, or by a screen reader
+const NEVER_PRESSED = ["dead_man", "turbo"]; // who drives holds these
 const KEYS = {
   " ": "dead_man", Shift: "turbo", F1: "release", p: "pause", s: "save", r: "reset", v: "prove", u: "undo",
   1: "expert_1", 2: "expert_2", 3: "expert_3", 4: "expert_4",
@@ -34,6 +36,7 @@ export class Hands {
     for (const end of ["pointerup", "pointercancel", "lostpointercapture"]) {
       page.addEventListener(end, (event) => this.lift(event));
     }
+    page.addEventListener("click", (event) => this.click(event));
     page.addEventListener("contextmenu", (event) => event.target.closest("footer") && event.preventDefault());
     for (const away of ["blur", "pagehide", "freeze"]) window.addEventListener(away, () => this.away());
     page.addEventListener("visibilitychange", () => page.hidden && this.away());
@@ -74,6 +77,19 @@ export class Hands {
     if (this.seated) event.preventDefault();
     if (down) this.keys.add(name);
     else this.keys.delete(name);
+    this.speak();
+  }
+
+  // Pressed without a pointer: by Enter on a button that has the focus, or by what a screen reader offers.
+  click(event) {
+    if (event.detail !== 0) return;
+    if (event.target.closest("#stop")) this.stop();
+    const control = event.target.closest("[data-control]")?.dataset.control;
+    if (!control || NEVER_PRESSED.includes(control)) return;
+    const pressed = Symbol(control);
+    this.touched.set(pressed, control);
+    setTimeout(() => this.lift({ pointerId: pressed }), PRESS_MS);
+    this.show();
     this.speak();
   }
 

@@ -1,5 +1,5 @@
 // The page: one socket to lira web. What comes is shown (draw.js), what the hands do goes back (hands.js).
-import { Curve, Trail, drawFan, drawMap, showActions, showCounts } from "/static/draw.js";
+import { Curve, Trail, drawFan, drawLaps, drawMap, showActions, showCounts } from "/static/draw.js";
 import { Hands } from "/static/hands.js";
 
 const RETRY_MS = 500;
@@ -54,7 +54,8 @@ function show(frame) {
   at("#actions").classList.toggle("empty", frame.actors.length === 0);
   showActions(at("#actions tbody"), frame, words);
   showCounts(at("#taught dl"), frame.counts, words);
-  if (frame.counts !== null) curve.add(frame).draw(at("#taught canvas"));
+  if (frame.session?.curve.length) drawLaps(at("#taught canvas"), frame.session.curve);
+  else if (frame.counts !== null) curve.add(frame).draw(at("#taught canvas"));
   offerExperts(frame.actors.filter((actor) => actor.activation !== null).map((actor) => actor.name));
 }
 
@@ -159,7 +160,7 @@ document.documentElement.lang = settings.language;
 document.title = `lira: ${settings.robot}`;
 for (const element of document.querySelectorAll("[data-word]")) element.textContent = settings.words[element.dataset.word];
 for (const element of document.querySelectorAll("[data-title]")) element.title = settings.words[element.dataset.title];
-at("#stick").setAttribute("aria-label", settings.words.stick);
+for (const element of document.querySelectorAll("[data-label]")) element.setAttribute("aria-label", settings.words[element.dataset.label]);
 hands.listen(document);
 connect();
 setInterval(watch, 250);
