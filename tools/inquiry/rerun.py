@@ -47,7 +47,10 @@ class ToldTrainer(InlineTrainer):
 
 @dataclass(frozen=True, slots=True)
 class Difference:
-    """Where two ways part: the number of the call, the robot's time, what was asked, and what came of it in each."""
+    """Where two ways part: the number of the call, what was asked, and what came of it in each.
+
+    `time_s` counts from when the recording began.
+    """
 
     number: int
     time_s: float
@@ -152,7 +155,9 @@ class _Run:
         self._again.compared += 1
         was = outcome_of(call, OUTCOMES[call.name]) if call.outcome else None
         if was != outcome and repr(was) != repr(outcome):  # nan is no number, and the same
-            self._again.differences.append(Difference(number, self._time_s, call.name, was, outcome))
+            self._again.differences.append(
+                Difference(number, self._time_s - self._trace.began_s, call.name, was, outcome)
+            )
 
     def _call(self, call: MethodCall) -> object:
         """Make one call, and return what came of it where something was recorded of that."""
