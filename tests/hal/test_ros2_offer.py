@@ -1,5 +1,7 @@
 """A robot of ours offered to a graph of rmw_zenoh: seen, heard and driven there, and judged as on the bus."""
 
+import random
+import re
 import struct
 import threading
 import time
@@ -219,6 +221,36 @@ def test_what_has_no_attachment_or_is_garbage_drives_nothing_and_harms_nobody(ca
         there.drive(publisher, GO, lambda applied: applied.twist == GO)
         assert there.robot.failure is None
         assert "no sender" in capsys.readouterr().err
+
+
+def test_no_noise_on_any_of_its_keys_ends_it_or_sets_anything_off():
+    with offered() as there:
+        publisher = RosPublisher(there.session)
+        there.get_going(publisher)
+        noise = random.Random(7)
+        keys = [each.key for each in look(there.graph_at).endpoints]
+        for _ in range(400):
+            payload, beside = (noise.randbytes(noise.choice((0, 4, 33, 60, 300))) for _ in range(2))
+            if noise.random() < 0.5:
+                beside = RmwAttachment(noise.getrandbits(62), noise.getrandbits(62), noise.randbytes(16)).to_bytes()
+            there.session.put(noise.choice(keys), payload, attachment=beside)
+            there.session.get(noise.choice(keys), payload=payload, attachment=beside, timeout=0.1)
+        assert there.robot.failure is None
+        ask(there, "estop/release")  # noise may well have pressed it
+        there.get_going(publisher)
+
+
+def test_every_token_of_it_is_whole_for_a_strict_reader():
+    with offered() as there:
+        tokens = [str(reply.ok.key_expr).split("/") for reply in there.session.liveliness().get("@ros2_lv/**")]
+        assert len(tokens) >= 20
+        for parts in tokens:
+            assert len(parts) == (9 if parts[5] == "NN" else 13)
+            assert all(parts)
+            assert all(part.isascii() for part in parts)
+            if parts[5] != "NN":
+                assert re.fullmatch(r"RIHS01_[0-9a-f]{64}", parts[11])
+                assert re.fullmatch(r"[0-9]*:[0-9]*:[0-9]*,[0-9]*:,:,:,,", parts[12])
 
 
 def test_a_hand_in_the_graph_goes_before_policy_and_gives_back():

@@ -1,5 +1,6 @@
 """The services of a robot in a ROS graph, each a std_srvs/Trigger: its emergency stop, and a twin's fresh start."""
 
+import contextlib
 import threading
 from collections.abc import Callable
 
@@ -31,10 +32,11 @@ class Services:
         self._services = [node.service(key, _answering(ask)) for key, ask in asked.items()]
 
     def run(self, stop: threading.Event) -> None:
-        """Answer until `stop` is set."""
-        while not stop.wait(LOOK_S):
-            for service in self._services:
-                service.serve()
+        """Answer until `stop` is set, or the session is closed."""
+        with contextlib.suppress(BusError):
+            while not stop.wait(LOOK_S):
+                for service in self._services:
+                    service.serve()
 
 
 def _answering(ask: Callable[[], str]) -> Callable[[], Answer]:
