@@ -95,7 +95,7 @@ class Ros2Robot:
         self._seq = 0
         self._heard = False  # something came that `read` has not returned yet
         self._lock = threading.Lock()  # over the clock and what is sent
-        self._clock = ClockEstimate()
+        self._clock = ClockEstimate(even=True)
         self._silences = 0  # how often a topic that is needed was silent, and came back
         self._sent, self._sent_s = STOP, 0.0
         self._told = 0.0, math.inf  # what the time was last, and when by our own clock
