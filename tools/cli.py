@@ -37,6 +37,7 @@ EXTRAS = {
     "pyarrow": "export",
     "rerun": "rerun",
     "prometheus_client": "view",
+    "onnx": "onnx",
 }
 
 EXIT_ERROR = 2

@@ -125,6 +125,7 @@ class Bus:
         self._session.put(
             self._key(self._own(topic).key),
             payload,
+            encoding=zenoh.Encoding.APPLICATION_CDR.with_schema(topic.ros_type),
             attachment=attachment,
             priority=topic.qos.priority,
             congestion_control=zenoh.CongestionControl.DROP,

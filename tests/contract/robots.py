@@ -11,9 +11,12 @@ from tempfile import TemporaryDirectory
 
 import msgspec
 
+from lira.hal.bus.attachment import Attachment
 from lira.hal.bus.bus import Bus
+from lira.hal.bus.reader import RawSample
 from lira.hal.bus.sensors import SENSORS
-from lira.hal.bus.topics import CMD_VEL
+from lira.hal.bus.services import LOCKSTEP, Info
+from lira.hal.bus.topics import CMD_VEL, SIM_STATE
 from lira.hal.client.remote import RemoteArena, RemoteRobot
 from lira.hal.messages import Command, CourseState, Episode
 from lira.hal.messages.codec import encode
@@ -29,6 +32,10 @@ from lira.sim_backend.emulators.core2 import Firmware
 from lira.sim_backend.emulators.wired_twin import WiredTwin
 from lira.sim_backend.twin import Twin
 from lira.tools.launch.processes import free_port
+from lira.tools.recording.layout import Head
+from lira.tools.recording.reader import Recording
+from lira.tools.recording.recorded_robot import RecordedRobot
+from lira.tools.recording.writer import RecordingWriter
 
 ROSBOT = load_profile("rosbot2")
 PROFILE = msgspec.structs.replace(  # with every sensor that there is
@@ -200,8 +207,41 @@ def null_over_ros() -> Iterator[Rig]:
         assert far.close()
 
 
+RECORDED_S = 30.0
+EPOCH = 3
+
+
+def record(robot: NullRobot, folder: Path) -> Recording:
+    """Record a robot that nobody drives, as `lira record` would."""
+    began_s = robot.now()
+    head = Head("rosbot", "0", 0, round(began_s * 1e9), Info(robot.profile, LOCKSTEP, EPOCH))
+    with RecordingWriter(folder, head, split_bytes=2**30) as writer:
+        while robot.now() < began_s + RECORDED_S:
+            seen, now_ns = robot.read(), round(robot.now() * 1e9)
+            found = [(sensor.topic, sensor.compress, sensor.value(seen)) for sensor in SENSORS]
+            for topic, compress, value in [*found, (SIM_STATE, None, robot.state())]:
+                if value is not None:
+                    message = value if compress is None else compress(value, robot.profile)
+                    beside = Attachment(EPOCH, seen.seq, now_ns).to_bytes()
+                    writer.add(RawSample(topic.key, topic.ros_type, encode(message), beside, 0.0), now_ns, now_ns)
+            robot.wait(robot.now() + 0.05)
+    return Recording(folder)
+
+
+@contextmanager
+def recording() -> Iterator[Rig]:
+    with TemporaryDirectory() as name:
+        inner = NullRobot(PROFILE)
+        played = RecordedRobot(record(inner, Path(name) / "rec"))
+        robot = GovernedRobot(played)
+        robot.open()
+        yield Rig(robot, played, played)
+        robot.close()
+
+
 # `real_time` and `stepped` robots by name: some promises make no sense for them.
 REAL_TIME = {"null over zenoh", "twin over zenoh", "null over ROS 2", "rosbot on emulators"}
+STILL = {"recording"}  # where it goes was decided when it was recorded: nowhere
 STEPPED = {"null over zenoh in lockstep", "twin over zenoh in lockstep"}
 
 ROBOTS: dict[str, Callable[[], AbstractContextManager[Rig]]] = {
@@ -209,6 +249,7 @@ ROBOTS: dict[str, Callable[[], AbstractContextManager[Rig]]] = {
     "null over zenoh": null_real_time,
     "null over zenoh in lockstep": null_lockstep,
     "null over ROS 2": null_over_ros,
+    "recording": recording,
     "twin": twin,
     "twin over zenoh": twin_real_time,
     "twin over zenoh in lockstep": twin_lockstep,

@@ -3,7 +3,7 @@
 import math
 
 import pytest
-from robots import REAL_TIME, ROBOTS, STEPPED, Rig
+from robots import REAL_TIME, ROBOTS, STEPPED, STILL, Rig
 
 from lira.hal.errors import LiraError
 from lira.hal.messages import STOP, Applied, Command, Episode, Reason, Source, Twist, is_neutral
@@ -106,6 +106,7 @@ def test_nothing_moves_before_a_neutral_command(rig):
     steps_until(rig, go(rig), same(go(rig)))
 
 
+@pytest.mark.parametrize("rig", sorted(set(ROBOTS) - STILL), indirect=True)  # a recording takes commands, and stays
 def test_it_drives_as_told_and_says_so(rig):
     armed(rig)
     x_m = rig.arena.state().x_m

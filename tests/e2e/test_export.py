@@ -14,7 +14,6 @@ from lira.fusion.modalities.image import gray_image
 from lira.hal.messages import Image
 from lira.tools.cli import main
 from lira.tools.export.columns import SCAN
-from lira.tools.export.pictures import pictures_of, size_of
 from lira.tools.export.run import load_run
 from lira.tools.launch.processes import ChildProcess, free_port, lira_command
 
@@ -67,9 +66,10 @@ def test_what_the_learner_saw_is_in_the_data_set(run):
     labels = {(each.observation, each.source, each.novice): each for each in read_demonstrations(found.labels)}
     assert len(labels) > 20
     met = 0
+    pictures = found.pictures.of(step for table in found.tables for step in table.episode.steps)
     for table in found.tables:
-        steps = table.episode.steps
-        for number, (step, picture) in enumerate(zip(steps, pictures_of(steps, size_of(steps)), strict=True)):
+        for number, step in enumerate(table.episode.steps):
+            picture = next(pictures)
             decision = step.decision
             label = labels.get((decision.observation, decision.driver, decision.novice))
             if label is None:

@@ -24,6 +24,7 @@ from lira.hal.messages import (
     Twist,
 )
 from lira.hal.profile import load_profile
+from lira.tools.export.pictures import Pictures
 
 PROFILE = load_profile("thesis-sim")
 PERIOD_S = PROFILE.period_s
@@ -90,6 +91,12 @@ def recording():
             yield Message(APPLIED.key, Applied(Twist(7.0, 7.0), stamp(number), Source.POLICY, Reason.OK, (), 0, 0.0))
             yield Message(APPLIED.key, Applied(twist, stamp(number) + 0.1, Source.POLICY, Reason.OK, (), 0, 0.0))
             number += 1
+
+
+def pictures(messages=None):
+    """The pictures of a recording, as often as they are asked for."""
+    found = [each.message for each in (recording() if messages is None else messages) if each.key == CAMERA.key]
+    return Pictures(lambda: iter(found))
 
 
 def label(number, driver, *, stored):

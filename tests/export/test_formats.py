@@ -9,7 +9,7 @@ import h5py
 import numpy as np
 import pyarrow.parquet as pq
 import pytest
-from heard import DRIVERS, HEIGHT, LENGTHS, PROFILE, WIDTH, level, recording
+from heard import DRIVERS, HEIGHT, LENGTHS, PROFILE, WIDTH, level, pictures, recording
 
 from lira.hal.errors import StorageError
 from lira.tools.export.columns import tables_of
@@ -30,7 +30,7 @@ def tables(messages=None):
 def lerobot(tmp_path_factory):
     """A folder as LeRobot has it."""
     folder = tmp_path_factory.mktemp("lerobot") / "run"
-    write_lerobot(tables(), folder, robot="thesis-sim", task="follow the line", fps=FPS)
+    write_lerobot(tables(), pictures(), folder, robot="thesis-sim", task="follow the line", fps=FPS)
     return folder
 
 
@@ -136,13 +136,13 @@ def test_lerobot_reads_it_itself(lerobot):
 
 def test_a_run_without_a_camera_has_no_video(tmp_path):
     messages = [each for each in recording() if "camera" not in each.key]
-    write_lerobot(tables(messages), tmp_path / "run", robot="r", task="t", fps=FPS)
+    write_lerobot(tables(messages), pictures(messages), tmp_path / "run", robot="r", task="t", fps=FPS)
     assert info_of(tmp_path / "run")["video_path"] is None
     assert not (tmp_path / "run/videos").exists()
 
 
 def test_robomimic_has_a_group_for_each_episode(tmp_path):
-    write_robomimic(tables(), tmp_path / "run.hdf5", {"robot": "thesis-sim", "world": "line"})
+    write_robomimic(tables(), pictures(), tmp_path / "run.hdf5", {"robot": "thesis-sim", "world": "line"})
     with h5py.File(tmp_path / "run.hdf5") as file:
         assert file["data"].attrs["total"] == COUNT
         assert json.loads(file["data"].attrs["env_args"])["env_name"] == "line"
@@ -153,10 +153,35 @@ def test_robomimic_has_a_group_for_each_episode(tmp_path):
         assert demo["obs/image"].shape == (5, HEIGHT, WIDTH, 3)
         assert demo["obs/image"][3, 20, 40, 0] == level(3)
         assert demo["obs/scan"].shape == (5, PROFILE.features.bins)
+        assert demo["next_obs/image"][:, 20, 40, 0].tolist() == [level(n) for n in (1, 2, 3, 4, 4)]
+        assert (demo["next_obs/scan"][:-1] == demo["obs/scan"][1:]).all()
         assert demo["intervention"][:].tolist() == [True, True, False, False, False]
         assert [word.decode() for word in demo["source"][:]] == list(DRIVERS)
         assert [name.decode() for name in file["mask/train"][:]] == ["demo_0"]
         assert [name.decode() for name in file["mask/prove"][:]] == ["demo_1"]
+
+
+def test_robomimic_reads_it_itself(tmp_path):
+    sets = pytest.importorskip("robomimic.utils.dataset", reason="no client of others is installed")
+    from robomimic.utils.obs_utils import initialize_obs_utils_with_obs_specs
+
+    write_robomimic(tables(), pictures(), tmp_path / "run.hdf5", {"world": "line"})
+    initialize_obs_utils_with_obs_specs({"obs": {"low_dim": ["state", "scan"], "rgb": ["image"]}})
+    keys = {"obs_keys": ("state", "scan", "image"), "dataset_keys": ("actions", "intervention")}
+    data = sets.SequenceDataset(
+        str(tmp_path / "run.hdf5"),
+        **keys,
+        frame_stack=1,
+        seq_length=2,
+        filter_by_attribute="train",
+        hdf5_cache_mode=None,
+    )
+    assert len(data) == LENGTHS[0]
+    item = data[1]
+    assert item["actions"][:, 1] == pytest.approx([0.01, 0.02])
+    assert item["intervention"].tolist() == [True, False]
+    assert item["obs"]["image"][0, 20, 40, 0] == level(1)
+    assert item["next_obs"]["image"][0, 20, 40, 0] == level(2)
 
 
 def test_csv_has_a_line_for_each_step(tmp_path):
@@ -171,7 +196,7 @@ def test_csv_has_a_line_for_each_step(tmp_path):
     assert len(rows[0]) < 40
 
 
-@pytest.mark.parametrize("write", [write_csv, lambda t, p: write_robomimic(t, p, {})])
+@pytest.mark.parametrize("write", [write_csv, lambda t, p: write_robomimic(t, pictures(), p, {})])
 def test_nothing_is_written_over(tmp_path, write):
     (tmp_path / "there").write_text("mine")
     with pytest.raises(StorageError, match="cannot write"):
@@ -181,4 +206,4 @@ def test_nothing_is_written_over(tmp_path, write):
 
 def test_no_data_set_is_written_over(lerobot):
     with pytest.raises(StorageError, match="cannot write"):
-        write_lerobot(tables(), lerobot, robot="r", task="t", fps=FPS)
+        write_lerobot(tables(), pictures(), lerobot, robot="r", task="t", fps=FPS)

@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pyarrow.parquet as pq
 import pytest
-from heard import LENGTHS, PERIOD_S, PROFILE, picture, recording, scan, stamp
+from heard import LENGTHS, PERIOD_S, PROFILE, picture, pictures, recording, scan, stamp
 from rosbags.rosbag2 import StoragePlugin, Writer
 
 from lira.fusion.log.label_log import read_demonstrations
@@ -36,7 +36,7 @@ def features(number):
 def data_set(tmp_path_factory):
     folder = tmp_path_factory.mktemp("set") / "run"
     tables = tables_of(list(episodes_of(steps_of(recording()))), PROFILE)
-    write_lerobot(tables, folder, robot="thesis-sim", task="t", fps=5)
+    write_lerobot(tables, pictures(), folder, robot="thesis-sim", task="t", fps=5)
     return folder
 
 
@@ -109,8 +109,8 @@ def test_a_data_set_that_was_damaged_is_told(data_set, tmp_path):
 def test_pictures_among_the_numbers_are_as_good_as_a_video(data_set, tmp_path):
     folder = info_with(data_set, tmp_path, features={CAMERA: {"dtype": "image", "shape": [48, 64, 3]}})
     rows = pq.read_table(data_set / "data/chunk-000/file-000.parquet")
-    pictures = [{"bytes": bytes(picture(number).data), "path": ""} for number in range(len(rows))]
-    for part, table in (("data", rows.append_column(CAMERA, [pictures])), ("meta/episodes", None)):
+    kept = [{"bytes": bytes(picture(number).data), "path": ""} for number in range(len(rows))]
+    for part, table in (("data", rows.append_column(CAMERA, [kept])), ("meta/episodes", None)):
         target = folder / part / "chunk-000/file-000.parquet"
         target.parent.mkdir(parents=True)
         pq.write_table(

@@ -2,16 +2,17 @@
 
 from dataclasses import replace
 
+import cv2
 import numpy as np
 import pytest
-from heard import DRIVERS, HEIGHT, LENGTHS, PROFILE, WIDTH, Message, decision, label, level, recording, stamp
+from heard import DRIVERS, HEIGHT, LENGTHS, PROFILE, WIDTH, Message, decision, label, level, pictures, recording, stamp
 
 from lira.hal.bus.topics import APPLIED, CAMERA, DECISION, SCAN
 from lira.hal.messages import CompressedImage
 from lira.tools.export.buffer import in_buffer
 from lira.tools.export.columns import SCAN as SCAN_COLUMN
 from lira.tools.export.columns import tables_of
-from lira.tools.export.pictures import pictures_of, size_of
+from lira.tools.export.pictures import Pictures
 from lira.tools.export.steps import episodes_of, steps_of
 
 
@@ -25,15 +26,16 @@ def tables(messages=None):
 
 def test_a_step_has_what_was_measured_when_it_was_decided():
     for number, step in enumerate(steps()):
-        assert step.observation.scan.stamp_s == step.observation.image.stamp_s == stamp(number)
-        assert step.observation.odom.linear_m_s == pytest.approx(0.1 * number)  # not the one after
+        assert step.scan.stamp_s == stamp(number)
+        assert step.picture == number
+        assert step.odom.linear_m_s == pytest.approx(0.1 * number)  # not the one after
 
 
 def test_what_came_before_the_decision_was_told_but_after_it_was_made_is_of_the_next():
     late = [each for each in recording() if each.key != DECISION.key]
     late.append(Message(DECISION.key, decision(2, 1, "human")))
     (step,) = steps(late)
-    assert step.observation.scan.stamp_s == stamp(2)
+    assert step.scan.stamp_s == stamp(2)
 
 
 def test_the_last_that_the_wheels_got_before_the_next_decision_counts():
@@ -43,7 +45,7 @@ def test_the_last_that_the_wheels_got_before_the_next_decision_counts():
 
 
 def test_a_stale_sensor_is_none():
-    assert steps([each for each in recording() if each.key != SCAN.key])[3].observation.scan is None
+    assert steps([each for each in recording() if each.key != SCAN.key])[3].scan is None
 
 
 def test_laps_are_episodes():
@@ -106,18 +108,33 @@ def test_what_is_missing_stands_in_and_is_marked():
     table = tables(messages)[0]
     # A picture counts for 0.3 s, so that of the step before is as good.
     assert table["complete"].values.tolist() == [True, True, True, False, True]
-    shown = list(pictures_of(table.episode.steps, (HEIGHT, WIDTH)))
+    shown = list(pictures(messages).of(table.episode.steps))
     assert [int(each[0, -1, 0]) for each in shown] == [level(n) for n in (0, 1, 1, 1, 4)]
 
 
-def test_pictures_that_do_not_decode_or_have_another_size_are_no_fault():
+def test_pictures_that_do_not_decode_are_no_fault():
     broken = CompressedImage(stamp(0), b"\x89PNG nothing of it", "png")
     messages = [
         Message(CAMERA.key, broken) if each.key == CAMERA.key and each.message.stamp_s == stamp(0) else each
         for each in recording()
     ]
-    found = tables(messages)[0].episode.steps
-    assert size_of(found) == (HEIGHT, WIDTH)
-    assert int(next(pictures_of(found, (HEIGHT, WIDTH)))[0, 0, 0]) == 128
-    assert next(pictures_of(found[1:], (24, 32))).shape == (24, 32, 3)
-    assert size_of(steps([each for each in recording() if each.key != CAMERA.key])) is None
+    found = pictures(messages)
+    assert found.size == (HEIGHT, WIDTH)
+    steps_ = tables(messages)[0].episode.steps
+    assert [int(each[0, -1, 0]) for each in found.of(steps_)][:2] == [128, level(1)]
+    assert pictures([]).size is None
+
+
+def test_pictures_of_another_size_are_resized():
+    small = cv2.imencode(".png", np.full((24, 32, 3), 77, np.uint8))[1].tobytes()
+    found = [each.message for each in recording() if each.key == CAMERA.key]
+    found[1] = CompressedImage(stamp(1), small, "png")
+    shown = list(Pictures(lambda: iter(found)).of(steps()[:2]))
+    assert shown[1].shape == (HEIGHT, WIDTH, 3)
+    assert int(shown[1][0, 0, 0]) == 77
+
+
+def test_pictures_that_no_step_shows_are_passed_over():
+    found = [each.message for each in recording() if each.key == CAMERA.key]
+    shown = list(Pictures(lambda: iter(found)).of(steps()[3::3]))
+    assert [int(each[0, -1, 0]) for each in shown] == [level(3), level(6)]

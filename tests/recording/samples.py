@@ -2,9 +2,10 @@
 
 import itertools
 
+import cv2
 import numpy as np
 
-from lira.hal.bus.attachment import Attachment
+from lira.hal.bus.attachment import Attachment, parse_attachment
 from lira.hal.bus.reader import RawSample
 from lira.hal.bus.services import Info
 from lira.hal.bus.topics import BATTERY, CAMERA, ODOM, SCAN
@@ -35,9 +36,11 @@ def scan(seq, sent_s):
     return sample(SCAN, LaserScan(sent_s - 0.02, -1.0, 0.25, 0.1, 4.0, ranges), seq=seq, sent_s=sent_s)
 
 
-def picture(seq, sent_s, size=2000):
-    data = bytes(np.random.default_rng(seq).integers(0, 256, size, np.uint8))
-    return sample(CAMERA, CompressedImage(sent_s - 0.03, data), seq=seq, sent_s=sent_s)
+def picture(seq, sent_s):
+    """Noise, which no compression makes smaller: about 2 kB."""
+    noise = np.random.default_rng(seq).integers(0, 256, (44, 45), np.uint8)
+    data = cv2.imencode(".png", noise)[1].tobytes()
+    return sample(CAMERA, CompressedImage(sent_s - 0.03, data, "png"), seq=seq, sent_s=sent_s)
 
 
 def battery(sent_s):
@@ -55,12 +58,15 @@ def drive(seconds, rate_hz=20):
             yield picture(number, sent_s)
 
 
-def write(folder, samples, *, split_bytes=2**30, close=True):
-    """Write a recording; without `close` as a killed process leaves it after its last flush."""
+def write(folder, samples, *, split_bytes=2**30, close=True, aligned=False):
+    """Write a recording, a message each millisecond, or `aligned` when it was sent.
+
+    Without `close` it is as a killed process leaves it after its last flush.
+    """
     writer = RecordingWriter(folder, HEAD, split_bytes=split_bytes)
     log_ns = itertools.count(BEGAN_NS, 1_000_000)
     for each in samples:
-        now_ns = next(log_ns)
+        now_ns = parse_attachment(each.attachment).time_ns + OFFSET_NS if aligned else next(log_ns)
         writer.add(each, now_ns, now_ns - 500_000, 3)
     if close:
         writer.close()

@@ -35,7 +35,7 @@ MOVES = Applied(Twist(0.2, 0.1), 1.0, Source.POLICY, Reason.OK, (), 7, 0.05)
 def told(*messages, boundary=None):
     """What Prometheus reads after these messages: values by name and labels."""
     board = Board(boundary or Boundary())
-    board.note([Sample(topic, message, b"", 0, None) for topic, message in messages], 0.0)
+    board.note([Sample(topic, message, b"", 0) for topic, message in messages], 0.0)
     registry = CollectorRegistry()
     registry.register(board)
     families = text_string_to_metric_families(generate_latest(registry).decode())

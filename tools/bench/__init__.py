@@ -12,7 +12,7 @@ Row = dict[str, object]
 
 BENCHES = {
     "twin": "the twin in process: times real time as a sketch and in pybullet, which is put beside its bare calls",
-    "trial": "one trial of each of the usual methods: seconds, and what they are spent on",
+    "trial": "one trial of each of the usual methods: seconds, those of the processor, and what they are spent on",
     "lockstep": "twin and learner in two processes over the bus in lockstep: times real time",
     "latency": "from a capture to the applied command through the whole stack, beside a bare zenoh echo",
     "takeover": "from pressing the dead-man to the applied command, while a policy drives",
@@ -21,6 +21,7 @@ BENCHES = {
     "train": "one training step, beside a plain PyTorch loop, and what it does to the control loop",
     "drivers": "what the drivers need of a core, how old a published scan is, what the lidar's line loses in --minutes",
     "step": "where the time of one decision step goes, and of a whole run on line-obstacles",
+    "record": "control beside a recorder and without, for --minutes each; the recorder's share of a core, and losses",
     "log": "a million labels: the log written, opened and learned from, and the memory that takes",
     "preprocess": "a JPEG of 640x480 to 32x32 gray, beside full decoding and resizing",
     "fuzz": "garbage to every decoder that faces the bus",

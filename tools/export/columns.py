@@ -17,7 +17,7 @@
 | `observation_number`, `stamp_s` | which observation, and when, on the robot's clock |
 | `complete` | whether every sensor was there; else the last value stands in |
 
-Pictures are no column: `tools.export.pictures` yields them one by one.
+Pictures are no column: `tools.export.pictures` tells them one by one.
 """
 
 import math
@@ -80,7 +80,7 @@ def _columns(steps: Sequence[ExportStep], experts: Sequence[str], profile: Robot
         [step.decision for step in steps],
     )
     bins = profile.features.bins
-    seen = [step.observation.image is not None for step in steps]
+    seen = [step.picture is not None for step in steps]
     there = [scan is not None and state is not None for scan, state in zip(scans, states, strict=True)]
     return (
         _vector("observation.state", VELOCITY, _filled(states, (0.0, 0.0))),
@@ -132,7 +132,7 @@ def _filled(values: Sequence[T | None], otherwise: T) -> list[T]:
 
 
 def _state(step: ExportStep) -> Action | None:
-    odom = step.observation.odom
+    odom = step.odom
     return None if odom is None else (odom.linear_m_s, odom.angular_rad_s)
 
 
@@ -142,9 +142,9 @@ def _applied(step: ExportStep) -> Action:
 
 def _scan(step: ExportStep, profile: RobotProfile) -> FloatArray | None:
     """The scan in bins; None for one that is absent or that nobody could use."""
-    if step.observation.scan is None:
+    if step.scan is None:
         return None
     try:
-        return bin_scan(step.observation.scan, profile.features)[0]
+        return bin_scan(step.scan, profile.features)[0]
     except SensorError:
         return None

@@ -14,11 +14,10 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 
 from lira.hal.errors import StorageError
-from lira.hal.messages import ByteArray
 from lira.tools.export import video
 from lira.tools.export.columns import Column, Kind, Table
-from lira.tools.export.pictures import Size, pictures_of, size_of
-from lira.tools.export.statistics import Statistics, merged, picture_statistics, statistics_of
+from lira.tools.export.pictures import Pictures, Size
+from lira.tools.export.statistics import PictureSampler, Statistics, merged, statistics_of
 
 VERSION = "v3.0"
 CAMERA = "observation.images.camera"
@@ -42,28 +41,33 @@ COUNTED: dict[str, Kind] = {
 }
 
 
-def write_lerobot(tables: Sequence[Table], folder: Path, *, robot: str, task: str, fps: int) -> None:
+def write_lerobot(
+    tables: Sequence[Table], pictures: Pictures, folder: Path, *, robot: str, task: str, fps: int
+) -> None:
     """Write a new folder. Raises `StorageError`."""
-    size = size_of(step for table in tables for step in table.episode.steps)
+    size = pictures.size
     try:
         folder.mkdir(parents=True)
-        if size is not None:
-            video.write_video(folder / f"videos/{CAMERA}/{FILE}.mp4", _all_pictures(tables, size), size, fps)
-        statistics = [_statistics(table, columns, size) for table, columns in _with_counts(tables, fps)]
+        seen = [] if size is None else _write_pictures(folder, tables, pictures, size, fps)
+        statistics = _statistics(tables, seen, fps)
         _write_parquet(folder / f"data/{FILE}.parquet", _data(tables, fps))
         _write_parquet(folder / f"meta/episodes/{FILE}.parquet", _episodes(tables, statistics, size, task, fps))
         _write_parquet(folder / "meta/tasks.parquet", _tasks(task))
-        _write_json(
-            folder / "meta/stats.json", {name: merged([each[name] for each in statistics]) for name in statistics[0]}
-        )
+        whole = {name: merged([each[name] for each in statistics]) for name in statistics[0]}
+        _write_json(folder / "meta/stats.json", whole)
         _write_json(folder / "meta/info.json", _info(tables, robot=robot, size=size, fps=fps))
     except OSError as error:
         raise StorageError(f"cannot write {folder}: {error.strerror or error}", "Choose another folder.") from error
 
 
-def _all_pictures(tables: Sequence[Table], size: Size) -> Iterator[ByteArray]:
-    for table in tables:
-        yield from pictures_of(table.episode.steps, size)
+def _write_pictures(
+    folder: Path, tables: Sequence[Table], pictures: Pictures, size: Size, fps: int
+) -> list[Statistics]:
+    """Write all pictures; returns their statistics by episode. They are told once for both."""
+    sampler = PictureSampler(list(map(len, tables)))
+    all_steps = (step for table in tables for step in table.episode.steps)
+    video.write_video(folder / f"videos/{CAMERA}/{FILE}.mp4", sampler.through(pictures.of(all_steps)), size, fps)
+    return sampler.statistics()
 
 
 def _with_counts(tables: Sequence[Table], fps: int) -> Iterator[tuple[Table, tuple[Column, ...]]]:
@@ -95,10 +99,14 @@ def _arrow(column: Column) -> pa.Array:
     return pa.FixedSizeListArray.from_arrays(flat, len(column.names))
 
 
-def _statistics(table: Table, columns: Sequence[Column], size: Size | None) -> dict[str, Statistics]:
-    found = {column.name: statistics_of(column.values) for column in columns if column.kind != "string"}
-    if size is not None:
-        found[CAMERA] = picture_statistics(pictures_of(table.episode.steps, size), len(table))
+def _statistics(tables: Sequence[Table], seen: Sequence[Statistics], fps: int) -> list[dict[str, Statistics]]:
+    """Return those of each episode by feature; `seen` are its pictures'."""
+    found = [
+        {column.name: statistics_of(column.values) for column in columns if column.kind != "string"}
+        for _, columns in _with_counts(tables, fps)
+    ]
+    for each, pictures in zip(found, seen, strict=False):
+        each[CAMERA] = pictures
     return found
 
 

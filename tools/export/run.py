@@ -5,9 +5,11 @@ from pathlib import Path
 from typing import NamedTuple
 
 from lira.fusion.log.label_log import read_demonstrations
+from lira.hal.bus.topics import CAMERA
 from lira.hal.errors import CodecError, StorageError
 from lira.tools.export.buffer import in_buffer
 from lira.tools.export.columns import Table, tables_of
+from lira.tools.export.pictures import Pictures
 from lira.tools.export.steps import TOPICS, ExportStep, Heard, episodes_of, steps_of
 from lira.tools.recording.layout import Head
 from lira.tools.recording.reader import Recording
@@ -19,6 +21,7 @@ class RecordedRun(NamedTuple):
 
     head: Head
     tables: list[Table]
+    pictures: Pictures
     labels: Path | None
 
     @property
@@ -37,7 +40,8 @@ def load_run(path: Path, labels: Path | None = None) -> RecordedRun:
     tables = tables_of(list(episodes_of(steps)), recording.head.info.profile)
     if not tables:
         raise StorageError(f"nobody decided anything in {path}", "Record while lira fusion or lira drive decides.")
-    return RecordedRun(recording.head, tables, log)
+    pictures = Pictures(lambda: (each.message for each in _readable(recording.messages(CAMERA))))
+    return RecordedRun(recording.head, tables, pictures, log)
 
 
 def labels_beside(path: Path) -> Path | None:

@@ -1,13 +1,14 @@
 """Statistics of a data set's features, as LeRobot normalises by them. Pure."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
+from itertools import islice
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 QUANTILES = {"q01": 0.01, "q10": 0.1, "q50": 0.5, "q90": 0.9, "q99": 0.99}
-SAMPLED = 100  # pictures at most, evenly
+SAMPLED, MOST_PIXELS = 100, 30_000  # pictures of an episode at most, evenly, and numbers of each
 Statistics = dict[str, list[Any]]
 
 
@@ -26,12 +27,30 @@ def statistics_of(values: NDArray[Any]) -> Statistics:
     }
 
 
-def picture_statistics(pictures: Iterable[NDArray[np.uint8]], count: int) -> Statistics:
-    """Return them for RGB pictures by colour, in [0, 1], [3][1][1]; of `count` pictures some are looked at."""
-    wanted = set(np.linspace(0, count - 1, min(count, SAMPLED)).round().astype(int).tolist())
-    seen = [
-        picture.reshape(-1, 3)[:: max(1, picture.size // 30_000)] for n, picture in enumerate(pictures) if n in wanted
-    ]
+class PictureSampler:
+    """Looks at some pictures of each episode as they pass. `lengths` are those of the episodes."""
+
+    def __init__(self, lengths: Sequence[int]) -> None:
+        self._lengths = lengths
+        self._seen: list[list[NDArray[np.uint8]]] = []
+
+    def through(self, pictures: Iterable[NDArray[np.uint8]]) -> Iterator[NDArray[np.uint8]]:
+        """Let all pictures of all episodes pass, RGB uint8 [height, width, 3]."""
+        passing = iter(pictures)
+        for length in self._lengths:
+            wanted = set(np.linspace(0, length - 1, min(length, SAMPLED)).round().astype(int).tolist())
+            self._seen.append([])
+            for number, picture in enumerate(islice(passing, length)):
+                if number in wanted:
+                    self._seen[-1].append(picture.reshape(-1, 3)[:: max(1, picture.size // MOST_PIXELS)].copy())
+                yield picture
+
+    def statistics(self) -> list[Statistics]:
+        """Return those of each episode that has passed, by colour, in [0, 1], [3][1][1]."""
+        return [_by_colour(seen) for seen in self._seen]
+
+
+def _by_colour(seen: Sequence[NDArray[np.uint8]]) -> Statistics:
     found = statistics_of(np.concatenate(seen) / 255.0)
     shaped = {name: [[[value]] for value in values] for name, values in found.items() if name != "count"}
     return {**shaped, "count": [len(seen)]}

@@ -2,7 +2,7 @@
 
 A step is a decision of `lira/decision`. Its sensors are the newest that had been measured by then and were not stale,
 as in an `Observation`, and `applied` is the last that the wheels got before the next decision. Episodes are whole laps,
-whoever drove and whatever was learned from them.
+whoever drove and whatever was learned from them. Pictures are named by their number: a run's do not fit into memory.
 """
 
 import math
@@ -11,14 +11,14 @@ from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
 from typing import Any, Protocol
 
-from lira.hal.bus.sensors import SENSORS, Stamped, observation_of
-from lira.hal.bus.topics import APPLIED, DECISION, Topic
-from lira.hal.messages import Applied, Decision, Driver, Observation, Phase
+from lira.hal.bus.topics import APPLIED, CAMERA, DECISION, ODOM, SCAN, Topic
+from lira.hal.clock import is_fresh
+from lira.hal.messages import Applied, Decision, Driver, LaserScan, Odometry, Phase
 
 KEPT = 32  # of each sensor: a decision is told a period after what it was made on
 BREAK_S = 2.0  # a longer silence is the end of an episode
-_SENSORS = {sensor.topic.key: sensor for sensor in SENSORS}
-TOPICS: tuple[Topic[Any], ...] = (DECISION, APPLIED, *(sensor.topic for sensor in SENSORS))  # what steps are made of
+SENSORS: tuple[Topic[Any], ...] = (SCAN, ODOM, CAMERA)
+TOPICS: tuple[Topic[Any], ...] = (DECISION, APPLIED, *SENSORS)  # what steps are made of
 
 
 class Heard(Protocol):
@@ -35,10 +35,15 @@ class Heard(Protocol):
 
 @dataclass(frozen=True, slots=True)
 class ExportStep:
-    """One decision. `applied` is None if nothing was heard of the wheels; `in_buffer`: its label is learned from."""
+    """One decision. What was not there, or stale, is None; `in_buffer`: its label is learned from.
+
+    `picture` is the number of a picture in the recording, from 0.
+    """
 
     decision: Decision
-    observation: Observation
+    scan: LaserScan | None
+    odom: Odometry | None
+    picture: int | None
     applied: Applied | None
     in_buffer: bool = False
 
@@ -60,27 +65,22 @@ class ExportEpisode:
         return self.steps[0].decision.phase
 
 
-class _Senses:
-    """The last values of every sensor."""
+class _Newest:
+    """The last values of a sensor, each with its time."""
 
-    def __init__(self) -> None:
-        self._values: dict[str, deque[Stamped]] = {sensor.name: deque(maxlen=KEPT) for sensor in SENSORS}
+    def __init__(self, topic: Topic[Any]) -> None:
+        self._max_age_s = topic.max_age_s
+        self._values: deque[tuple[float, Any]] = deque(maxlen=KEPT)
 
-    def hear(self, key: str, value: Stamped) -> None:
+    def hear(self, stamp_s: float, value: Any) -> None:
         """Note a value."""
-        self._values[_SENSORS[key].name].append(value)
+        self._values.append((stamp_s, value))
 
-    def at(self, seq: int, stamp_s: float) -> Observation:
-        """Return what had been measured by then."""
-        newest = {
-            name: max((each for each in values if each.stamp_s <= stamp_s), key=_stamp, default=None)
-            for name, values in self._values.items()
-        }
-        return observation_of(seq, stamp_s, newest)
-
-
-def _stamp(value: Stamped) -> float:
-    return value.stamp_s
+    def at(self, now_s: float) -> Any:
+        """Return what had been measured by then; None if that was stale, or nothing."""
+        measured = [each for each in self._values if each[0] <= now_s]
+        stamp_s, value = max(measured, key=lambda each: each[0], default=(-math.inf, None))
+        return value if is_fresh(stamp_s, now_s, self._max_age_s) else None
 
 
 def steps_of(messages: Iterable[Heard]) -> Iterator[ExportStep]:
@@ -88,25 +88,27 @@ def steps_of(messages: Iterable[Heard]) -> Iterator[ExportStep]:
 
     Whether a step is learned from is told by the counts that decisions carry; `tools.export.buffer` knows it better.
     """
-    senses, waiting, applied = _Senses(), None, None
+    senses = {topic.key: _Newest(topic) for topic in SENSORS}
+    waiting: ExportStep | None = None
+    applied: Applied | None = None
+    pictures = 0
     for each in messages:
-        if each.key in _SENSORS:
-            senses.hear(each.key, each.message)
+        if each.key == CAMERA.key:
+            senses[each.key].hear(each.message.stamp_s, pictures)
+            pictures += 1
+        elif each.key in senses:
+            senses[each.key].hear(each.message.stamp_s, each.message)
         elif each.key == APPLIED.key:
             applied = each.message
         elif each.key == DECISION.key:
             decision = each.message
             if waiting is not None:
-                yield _done(waiting, applied)
+                yield replace(waiting, applied=applied)
             stored = waiting is not None and _grew(waiting.decision, decision)
-            observation = senses.at(decision.observation, decision.stamp_s)
-            waiting, applied = ExportStep(decision, observation, None, stored), None
+            scan, odom, picture = (senses[topic.key].at(decision.stamp_s) for topic in SENSORS)
+            waiting, applied = ExportStep(decision, scan, odom, picture, None, stored), None
     if waiting is not None:
-        yield _done(waiting, applied)
-
-
-def _done(step: ExportStep, applied: Applied | None) -> ExportStep:
-    return replace(step, applied=applied)
+        yield replace(waiting, applied=applied)
 
 
 def _grew(before: Decision, now: Decision) -> bool:

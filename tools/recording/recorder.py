@@ -48,7 +48,8 @@ def listen(bus: Bus, version: str, command: str, stop: threading.Event) -> tuple
                 offset_ns = round(sample.arrived_s * 1e9) + local_ns - sent.time_ns
                 if abs(offset_ns) < UNIX_NS:
                     offset_ns = 0  # the robot tells Unix time, and this message was so long under way
-                return Head(bus.robot, version, offset_ns, time.time_ns(), info, command), tap, heard
+                began_ns = round(heard[0].arrived_s * 1e9) + local_ns
+                return Head(bus.robot, version, offset_ns, began_ns, info, command), tap, heard
         time.sleep(POLL_S)
     raise BusError(f"the robot '{bus.robot}' answers and sends nothing", "Check that it runs: lira console shows it.")
 

@@ -47,6 +47,7 @@ GROUPS = {
     },
     ("records", "Records"): {
         "record": "record everything on a robot's bus, for later and for others' tools",
+        "play": "a recording on the bus again, or as a robot that takes commands",
         "info": "what a recording holds",
         "explain": "why the robot did what it did: of a recording, or now",
         "rerun": "put a recorded run through its method again: the same, or what would have been otherwise",

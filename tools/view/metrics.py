@@ -11,14 +11,28 @@ from prometheus_client.core import CounterMetricFamily, GaugeMetricFamily, Metri
 from prometheus_client.registry import Collector
 
 from lira.hal.bus.boundary import Boundary
-from lira.hal.bus.topics import APPLIED, BATTERY, DECISION, DIAGNOSTICS, ODOM, PICTURE, SESSION, TOPICS
+from lira.hal.bus.topics import (
+    APPLIED,
+    BATTERY,
+    CAMERA_INFO,
+    DECISION,
+    DEPTH_INFO,
+    DIAGNOSTICS,
+    METHOD,
+    ODOM,
+    PICTURE,
+    SESSION,
+    TF,
+    TOPICS,
+)
 from lira.hal.errors import ConfigError
 from lira.hal.messages import Applied, Call, Decision, DiagnosticArray, Odometry, Reason, SessionState, Source, Stage
 from lira.tools.view.source import Sample
 
 MOST_PARTS = 64  # of a process that reports on itself
-# Pictures are not counted here: they would be fetched from the robot for nothing else.
-COUNTED = tuple(topic.key for topic in TOPICS if topic.qos != PICTURE)
+# What is large, or sent only to those who listen, is not counted here: it would be fetched for nothing else.
+ON_DEMAND = (TF, CAMERA_INFO, DEPTH_INFO, METHOD)
+COUNTED = tuple(topic.key for topic in TOPICS if topic.qos != PICTURE and topic not in ON_DEMAND)
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,7 +64,7 @@ class Metrics:
         return int(self._server.server_port)
 
     def wanted(self) -> Collection[str]:
-        """Everything but pictures."""
+        """Everything that the robot tells anyway."""
         return COUNTED
 
     def show(self, samples: Sequence[Sample]) -> None:

@@ -22,7 +22,7 @@ from lira.tools.bench import BENCHES, Row, describe_machine
 from lira.tools.options import add_json
 from lira.tools.output.machine import table, take_stdout, write_file
 
-LASTING = ("soak", "drivers")  # those that go on for --minutes
+LASTING = ("soak", "drivers", "record")  # those that go on for --minutes
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -30,7 +30,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     names = "; ".join(f"{name}: {words}" for name, words in BENCHES.items())
     parser.add_argument("name", choices=BENCHES, metavar="NAME", help=names)
     parser.add_argument(
-        "--minutes", type=float, help="how long the soak (default: 30) or the line of drivers (0.25) goes on"
+        "--minutes",
+        type=float,
+        help="how long the soak (default: 30), the line of drivers (0.25) or each half of record (1) goes on",
     )
     add_json(parser)
     parser.add_argument("--history", type=Path, metavar="DIR", help="add the ratios to DIR/NAME.jsonl and compare")

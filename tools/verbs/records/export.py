@@ -4,10 +4,13 @@ lerobot: a LeRobotDataset v3.0 (parquet, MP4, JSON). robomimic: one HDF5 file. c
 Laps are episodes, whole, whoever drove: `intervention` and `source` say who, `in_buffer` what the learner kept. The log
 of labels is found beside the recording; without one the recording's counts tell what was kept.
 
+onnx: no data set, but a novice or an expert (a .safetensors file) for whatever runs ONNX; it takes the extra onnx.
+
 examples:
   lira export lerobot runs/mine datasets/mine
   lira export robomimic runs/mine mine.hdf5
   lira export csv recordings/20261127-120000 mine.csv
+  lira export onnx runs/mine/novice.safetensors novice.onnx
 """
 
 import argparse
@@ -17,14 +20,20 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from lira.tools.export.run import RecordedRun
 
-FORMATS = ("lerobot", "robomimic", "csv")
+DATA_SETS = ("lerobot", "robomimic", "csv")
+FORMATS = (*DATA_SETS, "onnx")
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
     add = parser.add_argument
     add("format", choices=FORMATS)
-    add("file", type=Path, metavar="FILE", help="an .mcap file, the folder of a recording, or of a run")
+    add(
+        "file",
+        type=Path,
+        metavar="FILE",
+        help="an .mcap file, the folder of a recording, or of a run; of onnx: a novice",
+    )
     add(
         "out",
         type=Path,
@@ -36,7 +45,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Read the run and write it."""
+    """Read the run, or the novice, and write it."""
+    if args.format == "onnx":
+        return write_network(args)
     from lira.tools.export.run import load_run
 
     found = load_run(args.file, args.labels)
@@ -45,6 +56,18 @@ def run(args: argparse.Namespace) -> int:
     kept = sum(int(table["in_buffer"].values.sum()) for table in found.tables)
     by = f"by {found.labels}" if found.labels else "by the recording's counts"
     print(f"written: {args.out}: {len(found.tables)} episodes, {count} steps; {kept} are in the buffer, {by}")
+    return 0
+
+
+def write_network(args: argparse.Namespace) -> int:
+    """Read a novice or an expert, and write it."""
+    from lira.fusion.inference.checkpoint import load_checkpoint
+    from lira.tools.export.onnx_file import write_onnx
+
+    network, checkpoint = load_checkpoint(args.file)
+    write_onnx(network, checkpoint, args.out)
+    kind = {"fusion": "a novice", "kernel": "a kernel novice"}.get(checkpoint.kind, f"a {checkpoint.kind} expert")
+    print(f"written: {args.out}: {kind} of '{checkpoint.profile}' that sees {' and '.join(checkpoint.features)}")
     return 0
 
 
@@ -58,9 +81,9 @@ def write(args: argparse.Namespace, found: "RecordedRun") -> None:
     elif args.format == "robomimic":
         from lira.tools.export.robomimic import write_robomimic
 
-        write_robomimic(found.tables, args.out, {"robot": robot, "world": world})
+        write_robomimic(found.tables, found.pictures, args.out, {"robot": robot, "world": world})
     else:
         from lira.tools.export.lerobot import write_lerobot
 
         task = args.task or (f"drive in {world}" if world else "drive")
-        write_lerobot(found.tables, args.out, robot=robot, task=task, fps=found.fps)
+        write_lerobot(found.tables, found.pictures, args.out, robot=robot, task=task, fps=found.fps)

@@ -1,0 +1,108 @@
+"""A network as ONNX, run by somebody else's runtime: the same actions, for one observation and for many."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import onnx
+import onnxruntime
+import pytest
+
+from lira.fusion.inference.checkpoint import Checkpoint, load_checkpoint, save_checkpoint
+from lira.fusion.inference.kernel_net import KernelNet
+from lira.fusion.learning.kernel_novice import KernelNovice
+from lira.fusion.learning.labels import Label
+from lira.fusion.learning.novice import LearningSettings
+from lira.fusion.policies.kernel import KernelSettings
+from lira.fusion.policies.networks import FusionNet
+from lira.fusion.preprocess import Features
+from lira.hal.errors import StorageError
+from lira.tools.cli import main
+from lira.tools.export.onnx_file import build, write_onnx
+
+PRETRAINED = sorted((Path(__file__).parents[2] / "fusion" / "pretrained").glob("*.safetensors"))
+SHAPES = {"image": (32, 32), "scan": (101,)}
+CLOSE = 1e-5
+
+
+def seeing(shapes, seed):
+    """Something to see, a picture's values multiples of 1/255."""
+    rng = np.random.default_rng(seed)
+    return Features(**{name: (rng.integers(0, 256, shape) / 255).astype(np.float32) for name, shape in shapes.items()})
+
+
+def ask(model, seen):
+    """What a runtime makes of some observations together, by output."""
+    session = onnxruntime.InferenceSession(model.SerializeToString(), providers=["CPUExecutionProvider"])
+    names = [each.name for each in session.get_outputs()]
+    together = {name: np.stack([each[name] for each in seen]) for name in seen[0]}
+    return dict(zip(names, session.run(None, together), strict=True))
+
+
+def about(network):
+    return Checkpoint.of(network, "thesis-sim", "a test", seed=1, cruise=(1.0, 0.0))
+
+
+def novice_of_plus():
+    """One that was shown something."""
+    experts = [
+        load_checkpoint(path)[0] for path in PRETRAINED if path.stem in ("thesis-sim-camera", "thesis-sim-lidar")
+    ]
+    novice = KernelNovice(KernelNet.from_experts(experts), LearningSettings(), KernelSettings(), mirrored=True)
+    rng = np.random.default_rng(5)
+    for k in range(12):
+        source = "human" if k % 4 < 2 else "camera"
+        novice.remember(Label(seeing(SHAPES, k), tuple(rng.uniform(-1.0, 1.0, 2).tolist()), source))
+    return novice.frozen()
+
+
+@pytest.mark.parametrize("path", PRETRAINED, ids=lambda path: path.stem)
+def test_an_expert_does_the_same(path):
+    network, checkpoint = load_checkpoint(path)
+    seen = [seeing(checkpoint.features, seed) for seed in range(5)]
+    model = build(network, checkpoint)
+    np.testing.assert_allclose(ask(model, seen)["action"], [network.act(each) for each in seen], atol=CLOSE)
+    np.testing.assert_allclose(ask(model, seen[:1])["action"], [network.act(seen[0])], atol=CLOSE)
+
+
+@pytest.mark.parametrize("filters", [16, 32])
+def test_a_novice_does_the_same(filters):
+    network = FusionNet(SHAPES, filters, seed=4).driving()
+    seen = [seeing(SHAPES, seed) for seed in range(5)]
+    np.testing.assert_allclose(
+        ask(build(network, about(network)), seen)["action"], [network.act(each) for each in seen], atol=CLOSE
+    )
+
+
+def test_a_novice_of_plus_does_the_same_and_says_how_sure_it_is():
+    network = novice_of_plus()
+    seen = [seeing(SHAPES, seed) for seed in range(3, 30, 4)]  # some of them it was shown
+    got = ask(build(network, about(network)), seen)
+    np.testing.assert_allclose(got["action"], [network.act(each) for each in seen], atol=CLOSE)
+    np.testing.assert_allclose(got["deviation"], [network.deviation(each) for each in seen], atol=CLOSE)
+    nothing = Features(**{name: np.zeros(shape, np.float32) for name, shape in SHAPES.items()})
+    assert np.isfinite(ask(build(network, about(network)), [nothing])["action"]).all()
+
+
+def test_a_file_says_what_it_is_and_the_verb_writes_it(tmp_path, capsys):
+    network = novice_of_plus()
+    given, out = tmp_path / "novice.safetensors", tmp_path / "novice.onnx"
+    save_checkpoint(given, network, about(network))
+    assert main(["export", "onnx", str(given), str(out)]) == 0
+    assert "kernel novice" in capsys.readouterr().out
+    model = onnx.load(out)
+    said = {each.key: each.value for each in model.metadata_props}
+    assert (said["kind"], said["profile"], said["provenance"]) == ("kernel", "thesis-sim", "a test")
+    assert json.loads(said["features"]) == {"image": [32, 32], "scan": [101]}
+    assert float(said["limit"]) > 0.0
+    assert [each.name for each in model.graph.input] == ["image", "scan"]
+    assert main(["export", "onnx", str(given), str(out)]) == 2  # nothing is written over
+    assert "cannot write" in capsys.readouterr().err
+
+
+def test_what_cannot_be_written_or_read_is_said(tmp_path, capsys):
+    assert main(["export", "onnx", str(tmp_path / "none.safetensors"), str(tmp_path / "out.onnx")]) == 2
+    assert "there is no checkpoint" in capsys.readouterr().err
+    network = FusionNet(SHAPES, 4).driving()
+    with pytest.raises(StorageError, match="cannot write"):
+        write_onnx(network, about(network), tmp_path / "no" / "folder.onnx")

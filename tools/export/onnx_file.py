@@ -1,0 +1,150 @@
+"""A novice or an expert as ONNX, for whatever runs that: the whole network, trunks included, for batches of any size.
+
+The inputs are called as the features are, float32 [n, *shape] in [0, 1]; `action` is [n, 2], linear and angular in
+[-1, 1] of the robot's top speeds. A novice of `plus` also says its `deviation` [n, 2]; its metadata hold the `limit`
+above which it knows less than in the runs that proved it.
+"""
+
+import json
+from collections.abc import Sequence
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import onnx
+from numpy.typing import ArrayLike
+from onnx import TensorProto, helper, numpy_helper
+
+from lira.fusion.inference.architecture import KERNEL, Architecture, Weights
+from lira.fusion.inference.checkpoint import Checkpoint
+from lira.fusion.inference.kernel_net import kernel, parts
+from lira.fusion.inference.layers import SLOPE
+from lira.fusion.inference.networks import DrivingNet
+from lira.hal.errors import StorageError
+
+OPSET = 17
+IR_VERSION = 8  # the format's, as old as that opset: older runtimes read it, too
+LEAST_LENGTH = 1e-12  # a trunk that sees nothing stays zero instead of becoming nan
+
+
+def write_onnx(network: DrivingNet, checkpoint: Checkpoint, path: Path) -> None:
+    """Write a new file. Raises `StorageError`."""
+    model = build(network, checkpoint)
+    try:
+        with path.open("xb") as file:
+            file.write(model.SerializeToString())
+    except OSError as error:
+        raise StorageError(f"cannot write {path}: {error.strerror}", "Choose another file.") from error
+
+
+def build(network: DrivingNet, checkpoint: Checkpoint) -> onnx.ModelProto:
+    """Make the model, with what the checkpoint says of itself as metadata."""
+    what, weights = network.architecture, network.weights()
+    graph = Graph()
+    seen = [_trunk(graph, what, weights, name) for name in what.shapes]
+    about = {name: value if isinstance(value, str) else json.dumps(value) for name, value in asdict(checkpoint).items()}
+    outputs = ["action"]
+    if what.kind == KERNEL:
+        _kernel(graph, what, weights, seen)
+        outputs.append("deviation")
+        about["limit"] = json.dumps(float(weights["limit"][0]))
+    else:
+        _layers(graph, what, weights, seen)
+    model = helper.make_model(
+        helper.make_graph(
+            graph.nodes,
+            what.kind,
+            [_value(name, shape) for name, shape in what.shapes.items()],
+            [_value(name, (2,)) for name in outputs],
+            graph.constants,
+        ),
+        producer_name="lira-rosbot",
+        opset_imports=[helper.make_opsetid("", OPSET)],
+        ir_version=IR_VERSION,
+        doc_string=__doc__,
+    )
+    helper.set_model_props(model, about)
+    onnx.checker.check_model(model, full_check=True)
+    return model
+
+
+class Graph:
+    """Nodes and constants as they are added; each gives out one value, by its name."""
+
+    def __init__(self) -> None:
+        self.nodes: list[onnx.NodeProto] = []
+        self.constants: list[onnx.TensorProto] = []
+
+    def constant(self, name: str, numbers: ArrayLike) -> str:
+        """Add numbers."""
+        self.constants.append(numpy_helper.from_array(np.asarray(numbers, order="C"), name))
+        return name
+
+    def add(self, kind: str, inputs: Sequence[str], output: str | None = None, **attributes: Any) -> str:
+        """Add a node and return the name of what it gives out."""
+        output = output or f"{kind.lower()}_{len(self.nodes)}"
+        self.nodes.append(helper.make_node(kind, list(inputs), [output], **attributes))
+        return output
+
+    def dense(self, x: str, weights: Weights, layer: str) -> str:
+        """y = W x + b."""
+        named = [self.constant(name, weights[name]) for name in (f"{layer}.weight", f"{layer}.bias")]
+        return self.add("Gemm", [x, *named], transB=1)
+
+    def rectified(self, x: str) -> str:
+        """Leaky rectifier."""
+        return self.add("LeakyRelu", [x], alpha=float(SLOPE))
+
+
+def _value(name: str, shape: Sequence[int]) -> onnx.ValueInfoProto:
+    return helper.make_tensor_value_info(name, TensorProto.FLOAT, ["n", *shape])
+
+
+def _trunk(graph: Graph, what: Architecture, weights: Weights, feature: str) -> str:
+    """What looks at one feature, [n, size]."""
+    trunk = what.trunks[feature]
+    if len(what.shapes[feature]) == 1:
+        hidden = graph.rectified(graph.dense(feature, weights, f"{trunk}.fc1"))
+        return graph.rectified(graph.dense(hidden, weights, f"{trunk}.fc2"))
+    hidden = graph.add("Unsqueeze", [feature, graph.constant(f"{trunk}.channel", np.array([1]))])
+    for layer in (f"{trunk}.conv1", f"{trunk}.conv2"):
+        named = [graph.constant(name, weights[name]) for name in (f"{layer}.weight", f"{layer}.bias")]
+        hidden = graph.rectified(graph.add("Conv", [hidden, *named]))
+    pooled = graph.add("MaxPool", [hidden], kernel_shape=[2, 2], strides=[2, 2])
+    return graph.add("Flatten", [pooled])
+
+
+def _layers(graph: Graph, what: Architecture, weights: Weights, seen: Sequence[str]) -> None:
+    """The layers behind the trunks, tanh at the end."""
+    x = graph.add("Concat", seen, axis=1)
+    for layer in what.layers[:-1]:
+        x = graph.rectified(graph.dense(x, weights, layer))
+    graph.add("Tanh", [graph.dense(x, weights, what.layers[-1])], "action")
+
+
+def _kernel(graph: Graph, what: Architecture, weights: Weights, seen: Sequence[str]) -> None:
+    """The regression of `fusion/policies/kernel.py`, in double precision as there."""
+    pieces, widths = parts(what.trunk_sizes), weights["lengths"].astype(np.float64) ** 2
+    covariance = kernel(weights["x"], weights["x"], pieces, widths) + np.diag(weights["noise"].astype(np.float64))
+    p = np.linalg.inv(covariance)
+    least, one = graph.constant("least", np.float32(LEAST_LENGTH)), graph.constant("one", np.float64(1.0))
+    exponents = []
+    for k, (name, part, width) in enumerate(zip(seen, pieces, widths, strict=True)):
+        length = graph.add("Max", [graph.add("ReduceL2", [name], axes=[1], keepdims=1), least])
+        unit = graph.add("Div", [name, length])
+        likeness = graph.add("MatMul", [unit, graph.constant(f"x.{k}", weights["x"][:, part].T)])
+        off = graph.add("Sub", [graph.add("Cast", [likeness], to=TensorProto.DOUBLE), one])
+        exponents.append(graph.add("Div", [off, graph.constant(f"width.{k}", width)]))
+    values = graph.add("Exp", [graph.add("Sum", exponents)])
+    mean = graph.add("MatMul", [values, graph.constant("a", p @ weights["y"])])
+    gains = graph.constant("gains", np.array([1.0, weights["gain"][0]], np.float32))
+    turned = graph.add("Mul", [graph.add("Cast", [mean], to=TensorProto.FLOAT), gains])
+    limits = [graph.constant("low", np.float32(-1.0)), graph.constant("high", np.float32(1.0))]
+    graph.add("Clip", [turned, *limits], "action")
+    known = graph.add("Mul", [graph.add("MatMul", [values, graph.constant("p", p)]), values])
+    axis = graph.constant("examples", np.array([1]))
+    rest = graph.add("Sub", [one, graph.add("ReduceSum", [known, axis], keepdims=1)])
+    spread = graph.add("Sqrt", [graph.add("Max", [rest, graph.constant("nothing", np.float64(0.0))])])
+    scale = graph.constant("scale", weights["scale"])
+    graph.add("Mul", [graph.add("Cast", [spread], to=TensorProto.FLOAT), scale], "deviation")
