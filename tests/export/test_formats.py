@@ -161,6 +161,16 @@ def test_robomimic_has_a_group_for_each_episode(tmp_path):
         assert [name.decode() for name in file["mask/prove"][:]] == ["demo_1"]
 
 
+def test_a_lap_of_one_step_is_a_lap(tmp_path):
+    messages = list(recording())[:7]  # up to the first decision and what came of it
+    write_robomimic(tables(messages), pictures(messages), tmp_path / "run.hdf5", {})
+    with h5py.File(tmp_path / "run.hdf5") as file:
+        assert file["data/demo_0/next_obs/image"].shape == (1, HEIGHT, WIDTH, 3)
+        assert (file["data/demo_0/next_obs/scan"][:] == file["data/demo_0/obs/scan"][:]).all()
+    write_lerobot(tables(messages), pictures(messages), tmp_path / "run", robot="r", task="t", fps=FPS)
+    assert info_of(tmp_path / "run")["total_frames"] == 1
+
+
 def test_robomimic_reads_it_itself(tmp_path):
     sets = pytest.importorskip("robomimic.utils.dataset", reason="no client of others is installed")
     from robomimic.utils.obs_utils import initialize_obs_utils_with_obs_specs

@@ -129,13 +129,16 @@ def test_what_a_robot_cannot_do_is_cut_and_counted(tmp_path):
     assert [label.action for label in read_demonstrations(tmp_path / "labels.lira")] == [(1.0, 0.1), (0.5, 0.1)]
     with pytest.raises(StorageError, match="nothing to learn from"):
         keep([], tmp_path / "others.lira", PROFILE)
+    assert not (tmp_path / "others.lira").exists()
 
 
 def test_what_cannot_be_a_label_is_told_or_left_out(tmp_path):
     nothing = Shown(1.0, 0, features(0), (float("nan"), 0.1))
-    tally = keep([nothing, Shown(2.0, 0, features(1), (0.5, 0.1), "o" * 99)], tmp_path / "labels.lira", PROFILE)
-    assert (tally.taken, tally.without) == (1, 1)
-    assert [label.source for label in read_demonstrations(tmp_path / "labels.lira")] == ["human"]
+    others = [Shown(2.0, 0, features(1), (0.5, 0.1), name) for name in ("lab/wall:go", "o" * 99, " ", "a\n")]
+    tally = keep([nothing, *others], tmp_path / "labels.lira", PROFILE)
+    assert (tally.taken, tally.without) == (4, 1)
+    names = [label.source for label in read_demonstrations(tmp_path / "labels.lira")]
+    assert names == ["lab/wall:go", "human", "human", "human"]
     metres = Features(image=features(0).image, scan=features(0).scan * 4)
     with pytest.raises(StorageError, match="not within 0 and 1"):
         keep([Shown(1.0, 0, metres, (0.5, 0.1))], tmp_path / "labels.lira", PROFILE)

@@ -74,11 +74,8 @@ def tables_of(episodes: Sequence[ExportEpisode], profile: RobotProfile) -> list[
 
 
 def _columns(steps: Sequence[ExportStep], experts: Sequence[str], profile: RobotProfile) -> tuple[Column, ...]:
-    scans, states, decisions = (
-        [_scan(step, profile) for step in steps],
-        [_state(step) for step in steps],
-        [step.decision for step in steps],
-    )
+    decisions = [step.decision for step in steps]
+    scans, states = [_scan(step, profile) for step in steps], [_state(step) for step in steps]
     bins = profile.features.bins
     seen = [step.picture is not None for step in steps]
     there = [scan is not None and state is not None for scan, state in zip(scans, states, strict=True)]

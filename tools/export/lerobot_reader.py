@@ -138,8 +138,8 @@ def _pictures(folder: Path, info: Info, episode: Mapping[str, Any], key: str) ->
     """Yield an episode's pictures, RGB, one for each frame."""
     begin_s, end_s = (float(episode[f"videos/{key}/{edge}_timestamp"]) for edge in ("from", "to"))
     where = {name: episode[f"videos/{key}/{name}"] for name in ("chunk_index", "file_index")}
-    assert info.video_path is not None
-    with av.open(str(folder / info.video_path.format(video_key=key, **where))) as file:
+    path = (info.video_path or "").format(video_key=key, **where)
+    with av.open(str(folder / path)) as file:
         stream = file.streams.video[0]
         file.seek(int(Fraction(begin_s) / (stream.time_base or Fraction(1))), stream=stream, backward=True)
         for frame in file.decode(stream):

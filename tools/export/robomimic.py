@@ -68,7 +68,9 @@ def _point_to_next(group: Any, name: str) -> None:
     """Have what is seen a step later without a second copy of it; the last step has its own."""
     seen = group[f"obs/{name}"]
     layout, source = h5py.VirtualLayout(seen.shape, seen.dtype), h5py.VirtualSource(seen)
-    layout[:-1], layout[-1:] = source[1:], source[-1:]
+    layout[-1:] = source[-1:]
+    if len(seen) > 1:
+        layout[:-1] = source[1:]
     group.create_virtual_dataset(f"next_obs/{name}", layout)
 
 

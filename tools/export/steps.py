@@ -135,4 +135,4 @@ def episodes_of(steps: Iterable[ExportStep]) -> Iterator[ExportEpisode]:
 
 def _apart(before: Decision, now: Decision) -> bool:
     passed_s = now.stamp_s - before.stamp_s
-    return (before.phase, before.lap) != (now.phase, now.lap) or not 0.0 < passed_s <= BREAK_S or math.isnan(passed_s)
+    return (before.phase, before.lap) != (now.phase, now.lap) or not 0.0 < passed_s <= BREAK_S
