@@ -95,8 +95,9 @@ def features_for(info: Info, profile: RobotProfile, named: Mapping[str, str]) ->
     found = {}
     for row in modalities_of(profile):
         shape = list(row.shape(profile))
-        guess = [SCAN] if row.trunk == "scan" else pictures if row.name == "image" and len(pictures) == 1 else []
-        key = named.get(row.name) or next(iter(guess), "")
+        usual = SCAN if row.trunk == "scan" else f"observation.images.{row.sensor}"
+        only = pictures[0] if row.name == "image" and len(pictures) == 1 else ""
+        key = named.get(row.name) or (usual if usual in info.features else only)
         if key not in info.features:
             what = f"it is not clear which feature of the data set is the robot's {row.name}"
             raise ConfigError(what, f"Say so with --map {row.name}=FEATURE; there are {', '.join(info.features)}.")
