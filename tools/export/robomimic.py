@@ -1,8 +1,8 @@
 """robomimic: one HDF5 file with a group for each episode, `data/demo_0` and so on.
 
 `obs` holds what a policy sees (`state`, `scan`, `image`, and `depth` of a robot that has it), `next_obs` the same a
-step later, `actions` what was driven, in [-1, 1]. All other columns lie beside them under their own names. `mask/train`,
-`mask/prove` and `mask/unseen` list the episodes of a phase.
+step later, `actions` what was driven, in [-1, 1]. All other columns lie beside them under their own names.
+`mask/train`, `mask/prove` and `mask/unseen` list the episodes of a phase.
 """
 
 import json
