@@ -113,7 +113,10 @@ class RunRecord(msgspec.Struct, frozen=True, tag="run"):
 
 
 class ContradictionRecord(msgspec.Struct, frozen=True):
-    """A label that the novice does not follow, since the `others` say otherwise; `number` is its place in the log."""
+    """A label that the novice does not follow, since the `others` say otherwise; `number` is its place in the log.
+
+    `stamp_s` counts from the first label of its lap.
+    """
 
     number: int
     source: str

@@ -43,7 +43,7 @@ def folder(tmp_path):
             weight = novice.weight(label.source)
             novice.remember(Label(label.features, label.action, label.source, weight))
         said = snapshot(tmp_path, novice, SIM, HEAD)()
-    assert "this label contradicts the rest and is not followed: 6 (camera, lap 1 at 1.2 s: turn -0.90" in said
+    assert "this label contradicts the rest and is not followed: 6 (camera, lap 1, 1.2 s into it: turn -0.90" in said
     return tmp_path
 
 

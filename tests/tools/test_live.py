@@ -137,7 +137,7 @@ def test_a_lap_goes_on_is_put_back_or_is_over(state, phase, words, expected):
 
 def test_a_session_teaches_its_own_layout_until_the_novice_was_examined():
     lessons = Lessons(5)
-    lessons.note_lap(lap(Phase.TRAIN, layout=5))
+    lessons.note_lap(passed=True)
     assert lessons.layout == 5
     assert list(lessons.draw(3)) == [6, 7, 8]
     assert list(lessons.draw(2)) == [9, 10]  # nobody is examined on the same layout twice
@@ -148,11 +148,11 @@ def test_what_the_novice_failed_is_taught_until_it_was_passed_and_then_something
     failed = [lap(Phase.UNSEEN, layout=number, passed=number not in (2, 4)) for number in lessons.draw(4)]
     lessons.note_proof([lap(Phase.PROVE), *failed])
     assert lessons.layout == 2
-    lessons.note_lap(lap(Phase.TRAIN, layout=2, passed=False))
+    lessons.note_lap(passed=False)
     assert lessons.layout == 2
-    lessons.note_lap(lap(Phase.TRAIN, layout=2))
-    assert lessons.layout == 4
-    lessons.note_lap(lap(Phase.TRAIN, layout=4))
+    lessons.note_lap(passed=True)
+    assert (lessons.layout, lessons.taught) == (4, 2)  # a proof begins where it was taught
+    lessons.note_lap(passed=True)
     assert lessons.layout == 5
     assert list(lessons.draw(2)) == [6, 7]
 
@@ -160,7 +160,7 @@ def test_what_the_novice_failed_is_taught_until_it_was_passed_and_then_something
 def test_who_fails_where_it_was_taught_is_taught_there_again():
     lessons = Lessons(0)
     lessons.note_proof([lap(Phase.PROVE, passed=False)])
-    lessons.note_lap(lap(Phase.TRAIN))
+    lessons.note_lap(passed=True)
     assert lessons.layout == 0
 
 
@@ -342,8 +342,29 @@ class NoService:
         self.session_method = method
 
 
-def hold(folder, *, script, laps=3, world="line", unseen=1, practice_s=0.0):
-    """A session on a twin in this process."""
+LONGEST = 600  # looks
+
+
+class InTurn(NoService):
+    """Asks in turn, each after so many looks at its stage. The hand is off the controls while it is judged."""
+
+    def __init__(self, session, turns, reach):
+        super().__init__(session, {})
+        self.turns, self.reach, self.hand, self.looks = list(turns), reach, reach.hand, 0
+
+    def serve(self):
+        stage = self.session.board.stage
+        self.reach.hand = None if stage is Stage.JUDGING else self.hand
+        self.looks += bool(self.turns) and stage is self.turns[0][0]
+        if self.turns and self.looks > self.turns[0][1]:
+            accepted, words = self.session.take(OperatorRequest(self.turns[0][2]))
+            self.turns = self.turns[accepted:]  # asked again until it has learned something
+            self.looks = 0 if accepted else self.looks
+            assert self.looks < LONGEST, words
+
+
+def hold(folder, *, script, laps=3, world="line", unseen=1, practice_s=0.0, floor=False):
+    """A session on a twin in this process; on a `floor` nobody says where the robot is, and `script` are turns."""
     place, profile = short(world), load_profile(TASKS["line"].profile)
     plan = Plan(METHODS["plus"], folder=folder, laps=laps)
     said, told, written = [], [], []
@@ -356,16 +377,16 @@ def hold(folder, *, script, laps=3, world="line", unseen=1, practice_s=0.0):
             file.write(room.head)
             journal = Journal(keep=room.keep, write=lambda record: (written.append(record), file.write(record)))
             room.go_on(journal.ledger)
-            course = Course(profile, place)
+            course, arena = (None, None) if floor else (Course(profile, place), robot.arena)
             rules = Rules(practice_s, "ada", laps, unseen=unseen)
             board = Board("ada", room.before, journal.ledger, robot.now, told.append, said.append)
             reach = Taught(robot, hand)
             driver = LapDriver(
-                *(robot, robot.arena, reach, room, journal, Always(), rules, board, said.append),
+                *(robot, arena, reach, room, journal, Always(), rules, board, said.append),
                 lambda applied: str(applied.reason),
             )
             session = LiveSession(driver, course, room, journal, rules, said.append)
-            driver.service = NoService(session, script)
+            driver.service = InTurn(session, script, reach) if floor else NoService(session, script)
             session.run()
         hand.close()
     return session, said, told, written
@@ -388,6 +409,23 @@ def test_a_session_goes_from_practice_to_a_verdict(held):
     assert said[0].startswith("practice")
     assert session.board.state.laps == len([each for each in laps if each.phase == Phase.TRAIN])
     assert all(record.state is not None for record in written if hasattr(record, "decision"))  # the truth is in it
+
+
+def test_on_a_floor_the_person_judges(tmp_path):
+    turns = [
+        (Stage.TEACHING, 60, Request.PROVE),
+        (Stage.JUDGING, 10, Request.FAILED),
+        (Stage.TEACHING, 30, Request.PROVE),
+        (Stage.JUDGING, 10, Request.PASSED),
+        (Stage.TEACHING, 5, Request.FINISH),  # a hand on the controls has gone on meanwhile
+    ]
+    session, _, told, written = hold(tmp_path, script=turns, floor=True)
+    judged = [record for record in written if isinstance(record, LapRecord) and record.phase is Phase.PROVE]
+    assert [each.passed for each in judged] == [False, True]
+    assert session.converged
+    verdicts = [(state.words, state.converged) for state in told if state.stage is Stage.VERDICT]
+    assert verdicts[0][0].startswith("It drove 0 of 1 times as you wanted")
+    assert [converged for _, converged in dict.fromkeys(verdicts)] == [False, True]
 
 
 def test_it_goes_on_another_day_with_counts_that_go_on(held):

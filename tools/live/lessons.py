@@ -8,14 +8,15 @@ from lira.hal.messages import Phase
 
 
 class Lessons:
-    """Layouts in their order. The `own` one is taught first; those of other days were `seen`.
+    """Layouts in their order: `layout` is taught next, `taught` was last. The `own` one comes first; those of other
+    days were `seen`.
 
     A layout is taught until a lap on it was passed. Then comes the next on which the novice failed its exam, and when
     there is none left, one that nobody has seen. Before the first exam there is but the own one.
     """
 
     def __init__(self, own: int, seen: Iterable[int] = ()) -> None:
-        self.layout = own
+        self.layout = self.taught = own
         self._unseen = max(own, *seen, own) + 1
         self._failed: deque[int] = deque()
         self._examined = False
@@ -25,9 +26,10 @@ class Lessons:
         first, self._unseen = self._unseen, self._unseen + count
         return range(first, self._unseen)
 
-    def note_lap(self, lap: LapRecord) -> None:
+    def note_lap(self, *, passed: bool) -> None:
         """A lap was taught on `layout`."""
-        if lap.passed and self._examined:
+        self.taught = self.layout
+        if passed and self._examined:
             self.layout = self._failed.popleft() if self._failed else self.draw(1)[0]
 
     def note_proof(self, laps: Sequence[LapRecord]) -> None:

@@ -63,13 +63,12 @@ class LiveSession:
         if self._rules.practice_s > 0.0:
             self._practise()
         while not driver.is_over() and self.board.state.laps - first < self._rules.laps:
-            layout = self._lessons.layout
-            lap = self._teach(layout)
+            lap = self._teach(self._lessons.layout)
             if driver.is_over():
                 break
             unaided = lap is not None and lap.passed and lap.unassisted and self._course is not None
             if self._novice.trained and (driver.asked is Request.PROVE or unaided):
-                self._prove(layout)
+                self._prove(self._lessons.taught)
                 if self._rules.minutes is None:
                     self._await_word()
                 elif self.converged and not self._rules.whole_time:
@@ -126,10 +125,10 @@ class LiveSession:
         began_s = self._driver.now()
         drive = None if self._course is None else self._course.lap(layout)
         record = self._driver.lap(self._classroom.method, drive, Phase.TRAIN, number)
-        if record is not None:
-            self._lessons.note_lap(record)
-        elif self._driver.now() < began_s + MOMENT_S:  # asked for the proof as the last lap ended
+        if record is None and self._driver.now() < began_s + MOMENT_S:  # asked for the proof as the last lap ended
             self.board.give_back_lap()
+        else:
+            self._lessons.note_lap(passed=record is not None and record.passed)
         return record
 
     def _prove(self, layout: int) -> None:

@@ -51,7 +51,7 @@ def contradiction_words(found: Sequence[ContradictionRecord]) -> str:
         return ""
     label = "this label contradicts" if len(found) == 1 else f"these {len(found)} labels contradict"
     each = [
-        f"{one.number} ({one.source}, lap {one.lap} at {one.stamp_s:.1f} s: "
+        f"{one.number} ({one.source}, lap {one.lap}, {one.stamp_s:.1f} s into it: "
         f"turn {one.action[1]:+.2f}, the others {one.others[1]:+.2f})"
         for one in found
     ]

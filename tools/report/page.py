@@ -20,7 +20,7 @@ from lira.tools.report.course import course
 from lira.tools.report.digest import Lap, Run
 from lira.tools.report.laps import COLUMNS, clock, lap_cells
 
-TRAINING_VIEWS = 6
+TRAINING_VIEWS, UNSEEN_VIEWS = 6, 12
 PICTURES = 24
 
 
@@ -63,7 +63,7 @@ def head(run: Run, title: str) -> str:
         parts.append(f'<p class="muted">{escape(" · ".join(facts))}</p>')
     parts.append(f'<dl class="tiles">{"".join(map(tile, figures(run)))}</dl>')
     unseen = [lap.record for lap in run.phase(Phase.UNSEEN) if lap.record]
-    if unseen:
+    if unseen and run.verdict is None:  # which says it of the newest proof alone
         words = unseen_words(unseen)
         parts.append(f"<p>{words[0].upper()}{words[1:]}.</p>")
     contradictions = "" if run.result is None else contradiction_words(run.result.contradictions)
@@ -145,11 +145,11 @@ def answer_table(run: Run) -> str:
 
 
 def top_views(run: Run) -> str:
-    """Where each lap went: training, the last proving run, every unseen layout."""
+    """Where each lap went: training, the last proving run, the last unseen layouts."""
     training = run.phase(Phase.TRAIN)
     if len(training) > TRAINING_VIEWS:
         training = training[: TRAINING_VIEWS // 2] + training[-(TRAINING_VIEWS // 2) :]
-    laps = [*training, *run.phase(Phase.PROVE)[-1:], *run.phase(Phase.UNSEEN)]
+    laps = [*training, *run.phase(Phase.PROVE)[-1:], *run.phase(Phase.UNSEEN)[-UNSEEN_VIEWS:]]
     figures = []
     for lap in laps:
         floor = course(run.head.world, lap.layout) if run.head else course("", lap.layout)

@@ -29,7 +29,7 @@ class StudyPlan(Table, frozen=True):
     practice_s: Annotated[float, Meta(ge=0.0, le=600.0)] = 30.0
     minutes: Annotated[float, Meta(gt=0.0, le=240.0)] = 15.0
     until_passed: bool = True
-    unseen: Annotated[int, Meta(ge=0, le=80)] = 3
+    unseen: Annotated[int, Meta(ge=0, le=80)] = 12
     speed: Annotated[float, Meta(ge=0.4, le=5.0)] = 1.0
     questions: tuple[Words, ...] = ()
 

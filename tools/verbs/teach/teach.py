@@ -10,7 +10,7 @@ examples:
   lira teach --as ada --speed 0.5                      slower than real time, for the first time
   lira teach --as ada --run runs/teach-ada             go on another day: labels and counts go on
   lira teach --connect 192.168.1.20:7447 --as ada      a robot that is there
-  lira teach --world line-obstacles --person scripted  a script drives by teleop as a hand would, at 2.5 times real time
+  lira teach --world line-obstacles --person scripted  a script drives by teleop as a hand would, at twice real time
 
 exit status: 0 if the newest proof was passed, or none was asked for; 1 if it was not; 2 if something went wrong
 """
@@ -32,7 +32,7 @@ from lira.tools.options import DEFAULT, add_expert, add_layout, add_record, add_
 if TYPE_CHECKING:
     from lira.tools.runs.plan import Plan
 
-SCRIPT_SPEED = 2.5
+SCRIPT_SPEED = 2.0
 SLOWEST, FASTEST = 0.4, 5.0  # of a person's; slower, a screen would take what the twin says for old
 READY_S = 90.0
 NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_-]{0,31}")
@@ -64,7 +64,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add("--connect", metavar="HOST:PORT", help="teach the robot or the twin that is there, instead of starting a twin")
     add("--name", default=DEFAULT_ROBOT, help=f"the robot's name on the bus {DEFAULT}")
     add("--listen", default=DEFAULT_ENDPOINT, metavar="HOST:PORT", help=f"where the twin listens {DEFAULT}")
-    add("--speed", type=_speed, help="of the twin, times real time (default: 1; with a scripted person 2.5)")
+    add("--speed", type=_speed, help="of the twin, times real time (default: 1; with a scripted person 2)")
     add("--method", default="plus", help=f"way of teaching, as in `lira fusion` {DEFAULT}")
     add("--practice", type=float, metavar="S", help="seconds of driving before it counts (default: 15, scripted: 2)")
     add("--unseen", type=natural, default=12, help=f"layouts that the novice has not seen, to prove itself {DEFAULT}")
