@@ -59,9 +59,13 @@ class ClockEstimate:
     command stamped with it never looks younger than it is. It never runs back, so a time that leaps ahead of all before
     is not taken at once: one such message would hold the estimate for ever. Between messages it goes on as fast as the
     robot's time was measured to pass, but no faster than ours: a twin may be slowed down, or too slow for its machine.
+
+    `even`: it passes as ours does. For who lets commands expire by the estimate: there, and only there, one that slows
+    down is the unsafe side, and delays that grow look like a slow clock.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, *, even: bool = False) -> None:
+        self._even = even
         self._offsets: deque[tuple[float, float]] = deque()
         self._rate = 1.0
         self._latest_s = float("-inf")
@@ -106,7 +110,8 @@ class ClockEstimate:
         self._offsets.append((local_s, offset_s))
         while self._offsets[0][0] < local_s - RATE_S:
             self._offsets.popleft()
-        self._rate = self._measured(local_s)
+        if not self._even:
+            self._rate = self._measured(local_s)
 
     def restart(self) -> None:
         """Forget all: the robot was started anew and its clock with it."""
@@ -118,10 +123,12 @@ class ClockEstimate:
         """Seconds on the robot's clock at `local_s`; only when `known`."""
         behind = 1.0 - self._rate
         newest_s = self._offsets[-1][0]
+        # Slower only while it is heard: what was heard last grows old as fast as ours once it is silent.
+        followed_s = min(local_s, newest_s + WINDOW_S)
         self._latest_s = max(
             self._latest_s,
             *(
-                local_s + offset_s - behind * (local_s - heard_s)
+                local_s + offset_s - behind * (followed_s - heard_s)
                 for heard_s, offset_s in self._offsets
                 if heard_s >= newest_s - WINDOW_S
             ),

@@ -20,7 +20,8 @@ LINK, FULL, MESSAGE = "links", "links for want of files", "messages"
 # One line for each link that its acceptor gave up, one for each message that the access list stopped, nothing else.
 FILTER = (
     "off,zenoh_link_tls=warn,zenoh_link_commons=warn,"
-    "zenoh::net::routing::interceptor=trace,zenoh::net::routing::interceptor::access_control=off"
+    "zenoh::net::routing::interceptor=trace,zenoh::net::routing::interceptor::access_control=off,"
+    "zenoh::net::routing::interceptor::low_pass=off"
 )
 VARIABLE = "RUST_LOG"
 _LINK = re.compile(rb"zenoh_link_\S+: .*Hint: increase the system open file limit")

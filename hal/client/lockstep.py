@@ -14,7 +14,7 @@ from lira.hal.messages import STOP, Applied, Clock, Command, CourseState, Observ
 from lira.hal.profile import RobotProfile
 
 ANSWER_S = 5.0  # wall time; a robot that is silent for longer is gone
-POLL_S = 0.0002
+POLL_S = 0.0001
 ROUNDING_S = 1e-6
 
 

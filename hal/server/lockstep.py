@@ -20,7 +20,8 @@ from lira.hal.server.info_service import InfoService
 from lira.hal.server.sensor_publisher import SensorPublisher
 
 REPEAT_S = 1.0  # wall time after which an unanswered observation is sent again, to whoever listens by now
-POLL_S = 0.0002
+POLL_S = 0.0001
+SERVICE_S = 0.002  # questions and the emergency stop are looked at so often, and before each command
 IDLE_S = 0.1  # after this long without an answer, polls are rarer
 IDLE_POLL_S = 0.002
 
@@ -73,33 +74,39 @@ class LockstepLoop:
 
     def _next_command(self, stop: threading.Event) -> Command | None:
         """Wait for the command that answers the observation; None once `stop` is set."""
-        since_s = shown_s = time.monotonic()
+        since_s = shown_s = serve_s = time.monotonic()
         while not stop.is_set():
-            self._info_service.serve(self._show)
-            self._estop.serve()
-            if self._inlet.estop():
-                self._robot.press_estop()
-            answer = self._answer()
-            if answer is not None:
-                return answer
-            now_s = time.monotonic()
+            answer, now_s = self._answer(), time.monotonic()
+            if answer is not None or now_s >= serve_s:
+                self._serve()
+                serve_s = now_s + SERVICE_S
+            if answer is not None and answer.answers == self._observation.seq:  # nobody has put the robot elsewhere
+                self._take_teleop()
+                return _free(answer)
             if now_s - shown_s > REPEAT_S:
                 self._show()
                 shown_s = now_s
             time.sleep(POLL_S if now_s - since_s < IDLE_S else IDLE_POLL_S)
         return None
 
+    def _serve(self) -> None:
+        """Answer questions, which may put the robot elsewhere, and see whether somebody pressed the emergency stop."""
+        self._info_service.serve(self._show)
+        self._estop.serve()
+        if self._inlet.estop():
+            self._robot.press_estop()
+
     def _answer(self) -> Command | None:
-        seq, now_s = self._observation.seq, self._robot.now()
-        # Policy is polled first: what teleop put before it has arrived by then.
-        answers = [command for command in self._inlet.policy(now_s) if command.answers == seq]
-        if not answers:
-            return None
-        for command in self._inlet.teleop(now_s):
-            if command.answers in (-1, seq):
+        """Policy's command that answers the observation. It is polled first: what was put before it is here by then."""
+        seq = self._observation.seq
+        answers = [command for command in self._inlet.policy(self._robot.now()) if command.answers == seq]
+        return answers[-1] if answers else None
+
+    def _take_teleop(self) -> None:
+        for command in self._inlet.teleop(self._robot.now()):
+            if command.answers in (-1, self._observation.seq):
                 with self._boundary.guard(TELEOP.key):
                     self._robot.submit(_free(command))
-        return _free(answers[-1])
 
 
 def _free(command: Command) -> Command:

@@ -28,7 +28,7 @@ CLOCKS = ("scan", "odom", "imu")  # stamped by the robot's computer; a camera ma
 COMMANDED = "cmd_vel"
 BLIND_S = 0.5  # driven on nothing older than this
 OPEN_S = 10.0
-LOOK_S = 0.002
+LOOK_S = 0.0005
 SEND_S = 0.05
 STOOD_S = 0.1  # nobody here waits so long before it looks at the time again
 FAREWELL = 3
@@ -93,8 +93,9 @@ class Ros2Robot:
         self._newest: dict[str, Any] = {}
         self._open = False
         self._seq = 0
+        self._heard = False  # something came that `read` has not returned yet
         self._lock = threading.Lock()  # over the clock and what is sent
-        self._clock = ClockEstimate()
+        self._clock = ClockEstimate(even=True)
         self._silences = 0  # how often a topic that is needed was silent, and came back
         self._sent, self._sent_s = STOP, 0.0
         self._told = 0.0, math.inf  # what the time was last, and when by our own clock
@@ -126,7 +127,8 @@ class Ros2Robot:
         """Return the newest of every sensor; what is older than its topic allows is None."""
         if not self._open:
             raise DeviceError("the robot is not open", "Call open() first.")
-        news = self._listen()
+        news = self._listen() or self._heard
+        self._heard = False
         if self._seq == 0 or news:
             self._seq += 1
         return observation_of(self._seq, self.now(), self._newest)
@@ -165,8 +167,10 @@ class Ros2Robot:
         time.sleep(max(until_s - self.now(), 0.0))
 
     def wait_news(self, until_s: float) -> None:
-        """Sleep a moment: there is nothing to wait for but time."""
-        time.sleep(min(max(until_s - self.now(), 0.0), LOOK_S))
+        """Sleep until something came, for `read` to return."""
+        while not self._heard and (left_s := until_s - self.now()) > 0.0:
+            time.sleep(min(left_s, LOOK_S))
+            self._heard = self._listen()
 
     def close(self) -> None:
         """Send zero. May be called twice."""

@@ -125,7 +125,7 @@ def test_what_is_killed_comes_back_and_nothing_drives_until_a_person_says_so(wor
         life.until(lambda: life.twists(0.3))  # heard again
         assert set(life.twists(WATCH_S)) == {STOP}
         assert life.process("driver")["pid"] == driver
-        assert list(Path("recordings").rglob("*.mcap"))
+        assert list(Path("runs/drive-line/recording").glob("*.mcap"))
         # The monitor is killed: nobody notices but who asks.
         life.kill("monitor")
         life.until(lambda: "heard" in life.status())

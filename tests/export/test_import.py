@@ -7,14 +7,16 @@ import numpy as np
 import pyarrow.parquet as pq
 import pytest
 from heard import LENGTHS, PERIOD_S, PROFILE, picture, pictures, recording, scan, stamp
+from rosbags.rosbag1 import Writer as Writer1
 from rosbags.rosbag2 import StoragePlugin, Writer
+from rosbags.typesys import Stores, get_typestore
 
 from lira.fusion.log.label_log import read_demonstrations
-from lira.fusion.preprocess import Preprocessor
+from lira.fusion.preprocess import Features, Preprocessor
 from lira.hal.errors import ConfigError, StorageError
 from lira.hal.messages import Applied, CompressedImage, LaserScan, Observation, Reason, Source, Twist, TwistStamped
 from lira.hal.messages.codec import encode, ros_type_of
-from lira.hal.messages.ros_types import TYPES
+from lira.hal.messages.ros_table import CODECS, TYPES
 from lira.tools.cli import main
 from lira.tools.export.bag_reader import choose, read_bag
 from lira.tools.export.columns import SCAN, tables_of
@@ -129,6 +131,24 @@ def test_what_a_robot_cannot_do_is_cut_and_counted(tmp_path):
         keep([], tmp_path / "others.lira", PROFILE)
 
 
+def test_what_cannot_be_a_label_is_told_or_left_out(tmp_path):
+    nothing = Shown(1.0, 0, features(0), (float("nan"), 0.1))
+    tally = keep([nothing, Shown(2.0, 0, features(1), (0.5, 0.1), "o" * 99)], tmp_path / "labels.lira", PROFILE)
+    assert (tally.taken, tally.without) == (1, 1)
+    assert [label.source for label in read_demonstrations(tmp_path / "labels.lira")] == ["human"]
+    metres = Features(image=features(0).image, scan=features(0).scan * 4)
+    with pytest.raises(StorageError, match="not within 0 and 1"):
+        keep([Shown(1.0, 0, metres, (0.5, 0.1))], tmp_path / "labels.lira", PROFILE)
+
+
+@pytest.mark.parametrize("path", ["data/{nothing}.parquet", "data/{chunk_index:x", "../nothing.parquet"])
+def test_a_description_that_makes_no_sense_is_told(data_set, tmp_path, path):
+    folder = info_with(data_set, tmp_path, data_path=path)
+    (folder / "meta/episodes").symlink_to(data_set / "meta/episodes")
+    with pytest.raises(StorageError, match="cannot be read"):
+        list(read_lerobot(folder, PROFILE))
+
+
 # Bags, written by rosbags.
 
 
@@ -185,6 +205,41 @@ def test_a_silent_sensor_and_a_pause_are_seen(tmp_path):
     paused = [(time_s + (30.0 if time_s >= stamp(5) else 0.0), topic, each) for time_s, topic, each in messages]
     shown = list(read_bag(bag(tmp_path / "paused", paused), PROFILE, {}))
     assert [each.episode for each in shown] == [1] * 5 + [2] * 5
+
+
+def test_messages_that_cannot_be_read_are_left_out(tmp_path):
+    with Writer(tmp_path / "bag", version=9, storage_plugin=StoragePlugin.MCAP) as writer:
+        connections = {}
+        for number, (time_s, topic, message) in enumerate(drive()):
+            if topic not in connections:
+                connections[topic] = writer.add_connection(topic, ros_type_of(type(message)), typestore=TYPES)
+            data = encode(message)
+            writer.write(connections[topic], round(time_s * 1e9), data[: len(data) // 2] if number % 7 == 3 else data)
+    assert 0 < len(list(read_bag(tmp_path / "bag", PROFILE, {}))) <= 5
+
+
+def test_a_bag_of_ros_1_is_as_good(tmp_path):
+    store = get_typestore(Stores.ROS1_NOETIC)
+    with Writer1(tmp_path / "old.bag") as writer:
+        connections = {}
+        for time_s, topic, message in drive():
+            kind = ros_type_of(type(message))
+            if topic not in connections:
+                connections[topic] = writer.add_connection(topic, kind, typestore=store)
+            writer.write(connections[topic], round(time_s * 1e9), store.serialize_ros1(ros1(message, store), kind))
+    shown = list(read_bag(tmp_path / "old.bag", PROFILE, {}))
+    assert len(shown) == 5
+    assert (shown[2].features.scan == features(2).scan).all()
+
+
+def ros1(message, store):
+    """The same as ROS 1 has it: every header counts."""
+    made = CODECS[type(message)].to_ros(message)
+    if not hasattr(made, "header"):
+        return made
+    values = {name: getattr(made, name) for name in made.__dataclass_fields__ if name != "__msgtype__"}
+    head = store.types["std_msgs/msg/Header"](seq=0, stamp=made.header.stamp, frame_id=made.header.frame_id)
+    return store.types[made.__msgtype__](**values | {"header": head})
 
 
 def test_which_topic_is_meant_has_to_be_clear():

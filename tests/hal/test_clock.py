@@ -71,6 +71,16 @@ def test_a_robot_whose_time_runs_as_ours_again_is_caught_up_with_at_once():
         assert clock.now(local_s) >= robot_s - 1e-9  # never behind its newest word
 
 
+@pytest.mark.parametrize("rate", [0.0, 0.4, 1.0])
+def test_what_was_heard_last_grows_old_once_the_robot_is_silent(rate):
+    """However slow its time seemed: delays that grow until nothing comes any more look like a clock that stops."""
+    clock = ClockEstimate()
+    for step in range(40):
+        clock.note(rate * 0.05 * step, 0.05 * step)
+    newest_s, silent_s = rate * 0.05 * 39, 0.05 * 39
+    assert clock.now(silent_s + 1.0) - newest_s >= 0.75
+
+
 def test_it_never_runs_back():
     clock = ClockEstimate()
     clock.note(100.0, 10.0)
@@ -138,3 +148,12 @@ def test_a_robot_that_was_silent_and_has_another_session_was_started_anew():
     assert not clock.hear(2, 1.0, 10.0 + SILENT_S - 0.01)
     assert clock.hear(2, 1.0, 10.0 + SILENT_S)
     assert clock.now(10.0 + SILENT_S) == 1.0
+
+
+def test_for_who_lets_commands_expire_by_it_time_never_slows_down():
+    """Delays that grow and then nothing: a governor that goes by an estimate of 0 would let no command expire."""
+    clock = ClockEstimate(even=True)
+    for step in range(100):
+        clock.note(100.0 + 0.02 * step, 0.02 * step + 0.018 * step)  # hardly any of it comes on time
+    before_s = clock.now(3.8)
+    assert clock.now(4.3) == pytest.approx(before_s + 0.5)

@@ -289,7 +289,9 @@ def test_what_is_offered_is_what_it_has_and_says_itself():
 def test_the_words_for_a_graph():
     assert graph_of("", 0, "/") == Graph()
     assert graph_of("own:127.0.0.1:7500", 3, "/a").told()[1].endswith("""'connect/endpoints=["tcp/127.0.0.1:7500"]'""")
-    router = graph_of("rosbot:7447", 0, "/")
+    with pytest.raises(ConfigError, match="anybody in the ROS 2 graph of rosbot:7447"):
+        graph_of("rosbot:7447", 0, "/")
+    router = graph_of("rosbot:7447", 0, "/", insecure=True)
     assert not router.own
     assert "router at rosbot:7447" in router.told()[0]
     with pytest.raises(ConfigError, match="no address"):

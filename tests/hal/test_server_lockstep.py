@@ -3,6 +3,7 @@
 import pytest
 from wiring import PROFILE, joined, remote, served, wait_for
 
+from lira.hal.bus.services import press_estop, release_estop
 from lira.hal.bus.topics import APPLIED, CMD_VEL, IN_LOCKSTEP
 from lira.hal.client.remote import RemoteArena, RemoteRobot
 from lira.hal.errors import BusError
@@ -50,6 +51,22 @@ def test_the_hand_that_was_put_before_policy_wins_its_step_and_no_other(robot):
             assert (applied.twist, applied.source) == ((TURN, Source.TELEOP) if hand else (GO, Source.POLICY))
             assert applied.answers == client.read().seq
             go_on(client)
+
+
+def test_an_emergency_stop_that_was_acknowledged_holds_in_the_step_that_is_answered_next(robot):
+    with remote(robot) as client:
+        policy(client, STOP)
+        go_on(client)
+        for _ in range(20):
+            assert policy(client, GO).twist == GO
+            go_on(client)
+            press_estop(client.bus)
+            assert policy(client, GO).reason is Reason.ESTOP
+            go_on(client)
+            release_estop(client.bus)
+            for _ in range(2):  # what was in the step of the release does not count
+                policy(client, STOP)
+                go_on(client)
 
 
 def test_two_runs_are_the_same():

@@ -11,6 +11,7 @@ import pytest
 from foreign import foreign_environment, ros_share, sdk_command
 
 from lira.hal.client.remote import connect
+from lira.tools.cli import main
 from lira.tools.launch.processes import ChildProcess, free_port, lira_command
 
 SCRIPTS = Path(__file__).parent / "foreign"
@@ -51,6 +52,19 @@ def test_a_peer_that_nobody_here_wrote_lists_it_hears_it_and_drives_it(tmp_path)
     assert 0.0 <= min(met["clock"]) < 0.3  # stamps are of now, in Unix time
     assert met["press"][0]
     assert met["press"][1].startswith("emergency")
+
+
+def test_what_does_not_go_together_is_refused_before_anything_moves(monkeypatch, capsys):
+    for words, what in [
+        (["--lockstep"], "--ros2 is for a robot on the bus in real time"),
+        (["--ros2-namespace", "a", "--ros2", "elsewhere:7447"], "anybody in the ROS 2 graph of elsewhere:7447"),
+        (["--ros2", "nowhere"], "'nowhere' is no address"),
+    ]:
+        assert main(["twin", "--listen", "127.0.0.1:1", "--ros2", *words]) == 2
+        assert what in capsys.readouterr().err
+    monkeypatch.setenv("LIRA_KEYS", "keys/robot")
+    assert main(["twin", "--listen", "127.0.0.1:1", "--ros2"]) == 2
+    assert "lira keys enroll ros" in capsys.readouterr().err
 
 
 def test_what_offers_it_may_be_killed_and_the_robot_stands_and_goes_on(tmp_path):

@@ -33,7 +33,7 @@ from lira.tools.verbs import VERBS
 ROOT = Path(__file__).parents[2]
 TWIN = Setup(processes=SETS["teach"], world="line", twin=("--world", "line"), folder="/home/ada/runs/plus-line")
 ROBOT = Setup(processes=("robot",), endpoint="0.0.0.0:7447", robot=("--base", "/dev/core2", "--without", "camera"))
-FACTS = Facts("/home/ada", 255, "3.11")
+FACTS = Facts("/home/ada", 255, (3, 11))
 OURS = File(".local/share/lira/rosbot/wheels/lira_rosbot-0.1.0-py3-none-any.whl", b"wheel")
 
 
@@ -70,7 +70,7 @@ def test_a_unit_is_watched_restarted_after_growing_pauses_and_begins_paused():
         assert f"\n{line}\n" in unit
     assert "--paused" in unit
     assert "After=lira-rosbot-twin.service" in unit
-    old = text_of(laptop(facts=Facts("/home/ada", 249, "3.10")), "-learner.service")
+    old = text_of(laptop(facts=Facts("/home/ada", 249, (3, 10))), "-learner.service")
     assert "RestartSteps" not in old
     assert "\nRestartSec=4\n" in old
 
@@ -111,7 +111,7 @@ def verify(tmp_path):
     return look
 
 
-OLD = Facts("/home/ada", 249, "3.11")  # no newer key than any systemd here knows
+OLD = Facts("/home/ada", 249, (3, 11))  # no newer key than any systemd here knows
 
 
 @pytest.mark.parametrize("names", [*SETS.values(), tuple(process.name for process in PROCESSES)])
@@ -144,8 +144,8 @@ def test_keys_go_along_for_their_user_alone_and_are_not_shown(tmp_path):
     assert {Path(file.path).name for file in secrets} >= {"key.pem", "cert.pem", "ca.pem"}
     assert {file.mode for file in secrets} == {SECRET}
     assert text_of(plan, "/environment") == "LIRA_KEYS=/home/ada/.config/lira/rosbot/keys\n"
-    assert "PRIVATE KEY" not in plan.shown()
-    assert "key.pem (600," in plan.shown()
+    assert "PRIVATE KEY" not in plan.shown([])
+    assert "key.pem (600," in plan.shown([])
     with tarfile.open(fileobj=io.BytesIO(plan.archive())) as archive:
         assert {member.mode for member in archive if "/keys/" in member.name} == {SECRET}
 
@@ -165,6 +165,20 @@ def test_files_that_the_robots_words_name_go_along(tmp_path):
     settings.unlink()
     with pytest.raises(ConfigError, match=r"my-robot\.toml"):
         for_robot(setup, FACTS, [OURS], None)
+
+
+@pytest.mark.parametrize(("python", "said"), [((3, 8), r"is 3\.8"), ((0, 0), "is none")])
+def test_a_robot_whose_python_is_too_old_is_refused(python, said):
+    with pytest.raises(ConfigError, match=said):
+        for_robot(ROBOT, Facts("/home/ada", 255, python), [OURS], None)
+
+
+def test_what_a_shell_prints_at_its_start_is_passed_over(home):
+    (home / "shell").write_text('#!/bin/sh\necho welcome\necho 12\nexec /bin/sh "$@"\n')
+    (home / "shell").chmod(0o755)
+    (home.parent / "bin" / "sh").symlink_to(home / "shell")
+    facts = Target().look("rosbot")
+    assert (facts.home, facts.systemd, facts.python) == (str(home), 255, sys.version_info[:2])
 
 
 def test_rules_go_along_and_who_may_install_them_is_told_how():
@@ -199,10 +213,10 @@ def test_what_is_stale_goes_and_nothing_outside_the_home_folder_does():
 
 
 def test_wheels_are_installed_from_the_folder_that_goes_along():
-    lines = packages.steps("rosbot", [OURS], offline=True)
+    lines = packages.steps("rosbot", [OURS], "python3", offline=True)
     assert "--no-index" in lines[1]
     assert "'.local/share/lira/rosbot/wheels/lira_rosbot-0.1.0-py3-none-any.whl[robot,drive]'" in lines[1]
-    assert "--no-index" not in packages.steps("rosbot", [OURS], offline=False)[1]
+    assert "--no-index" not in packages.steps("rosbot", [OURS], "python3", offline=False)[1]
 
 
 def test_a_folder_without_our_wheel_is_refused(tmp_path):

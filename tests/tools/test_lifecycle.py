@@ -10,7 +10,9 @@ import time
 import msgspec
 import pytest
 
+from lira.hal.bus.sensors import SENSORS
 from lira.hal.errors import ConfigError
+from lira.hal.profile import load_profile
 from lira.tools.cli import EXTRAS, Parser, main
 from lira.tools.lifecycle import folder as folders
 from lira.tools.lifecycle import services
@@ -18,6 +20,7 @@ from lira.tools.lifecycle.arguments import Ports, add_setup, setup_of
 from lira.tools.lifecycle.folder import AlreadyUpError, StateFolder
 from lira.tools.lifecycle.line import WINDOW_S, Rate
 from lira.tools.lifecycle.logs import Follower, last_lines
+from lira.tools.lifecycle.monitor import rate_of
 from lira.tools.lifecycle.records import HEARD, STATE, Heard, ProcessState, State, TopicState
 from lira.tools.lifecycle.restart import CALM_S, LONGEST_S, READY_S, Phase, Restarts, pause_s
 from lira.tools.lifecycle.setup import Setup, endpoint_of, run_folder
@@ -239,6 +242,9 @@ HEARS = Heard(
 )
 
 
+MONITOR = ProcessState("monitor", "hears", Phase.RUNS, NOW_S - 90.0, 12, 1)
+
+
 def write(folder, pid, processes=ROWS, heard=HEARS):
     folder.write(STATE, State(SETUP, pid, NOW_S - 300.0, processes))
     folder.write(HEARD, heard)
@@ -264,11 +270,13 @@ def test_status_tells_processes_topics_link_and_who_drives(state_folder):
 
 def test_all_is_well_when_all_of_it_runs_and_the_robot_is_heard(state_folder):
     with state_folder.held():
-        write(state_folder, state_folder.supervisor(), ROWS[:1])
+        write(state_folder, state_folder.supervisor(), (ROWS[0], MONITOR))
         assert look("rosbot", NOW_S).is_well
         old = look("rosbot", NOW_S + 60.0)
         assert not old.is_well
         assert "nothing is heard of the robot" in as_text(old)
+        write(state_folder, state_folder.supervisor(), ROWS[:1])  # where nobody listens
+        assert look("rosbot", NOW_S + 60.0).is_well
 
 
 def test_what_an_earlier_supervisor_wrote_is_not_told(state_folder):
@@ -307,6 +315,11 @@ def test_a_rate_is_that_of_the_last_seconds():
         rate.note(tenth / 10)
     assert rate.hz(9.9) == pytest.approx(10.0, abs=0.5)
     assert rate.hz(9.9 + WINDOW_S) == 0.0
+
+
+def test_a_sensors_usual_rate_is_the_profiles():
+    rates = {sensor.name: rate_of(sensor, load_profile("thesis-sim")) for sensor in SENSORS}
+    assert (rates["scan"], rates["camera"], rates["odom"]) == (10.0, 15.0, None)
 
 
 def test_the_last_lines_of_a_log(tmp_path):

@@ -11,6 +11,7 @@ from pathlib import Path
 import pytest
 
 from lira.hal.errors import LiraError
+from lira.tools.launch.processes import ChildProcess
 from lira.tools.lifecycle import restart, supervisor, table
 from lira.tools.lifecycle.control import bring_up, take_down
 from lira.tools.lifecycle.folder import StateFolder
@@ -145,7 +146,7 @@ def test_one_that_ends_by_itself_comes_back_too_and_waits_longer_each_time(bed, 
     there = bed(stand_in("learner", WELL, str(word)))
     with there.supervisor:
         there.until(lambda: "learner" in there.states and there.states["learner"].starts == 3)
-    assert there.said[:2] == [
+    assert [words for words in there.said if "ended" in words][:2] == [
         f"learner ended with status 0; it is started again in {pause_s} s" for pause_s in ("0.2", "0.4")
     ]
 
@@ -174,7 +175,7 @@ def test_in_the_end_the_robot_is_stopped_last_and_nothing_is_left(bed, tmp_path)
     with there.supervisor:
         there.until(lambda: there.runs("robot", "learner"))
         pids = [process.pid for process in there.states.values()]
-    assert there.said == ["learner stopped", "robot stopped"]
+    assert there.said == ["robot: it works", "learner: it works", "learner stopped", "robot stopped"]
     assert {process.phase for process in there.states.values()} == {Phase.STOPPED}
     assert not any(map(is_running, pids))
 
@@ -188,6 +189,24 @@ def test_a_log_does_not_grow_without_end(bed, tmp_path, monkeypatch):
         there.until(lambda: older.exists() and there.folder.log("learner").stat().st_size > 1000)
         assert there.folder.log("learner").stat().st_size < 20_000
         assert older.stat().st_size < 20_000
+
+
+def test_one_that_cannot_be_stopped_keeps_none_of_the_others_up(bed, monkeypatch):
+    there = bed(stand_in("robot", WELL, "never", is_robot=True), stand_in("learner", WELL, "never"))
+    there.until(lambda: there.runs("robot", "learner"))
+    robot, learner = there.states["robot"].pid, there.states["learner"].pid
+    really = ChildProcess.stop
+
+    def stubborn(child):
+        status = really(child)
+        if child.pid == learner:
+            raise LiraError("cannot be killed")
+        return status
+
+    monkeypatch.setattr(ChildProcess, "stop", stubborn)
+    with pytest.raises(LiraError, match="cannot be killed"), there.supervisor:
+        pass
+    assert not is_running(robot)
 
 
 def test_a_disk_that_takes_no_state_stops_nobody(bed, monkeypatch):
@@ -244,7 +263,7 @@ def test_up_tells_what_is_ready_and_down_ends_it(outside):
     assert folder.supervisor() == state.pid
     said.clear()
     assert take_down("rosbot", said.append)
-    assert sorted(said) == ["learner stopped", "robot stopped"]
+    assert said == ["learner stopped", "robot stopped"]
     assert not any(is_running(process.pid) for process in state.processes)
     assert not take_down("rosbot", said.append)
 

@@ -1,5 +1,6 @@
 """Standard output that is full, closed, or read by nobody any more: one line, and an orderly end."""
 
+import re
 import subprocess
 import sys
 import time
@@ -9,6 +10,7 @@ import pytest
 
 from lira.tools import cli
 from lira.tools.launch.processes import free_port, lira_command
+from lira.tools.output.when import when
 
 END_S = 5.0
 FULL = Path("/dev/full")
@@ -99,3 +101,8 @@ def test_another_error_of_the_system_is_a_bug_and_shows(monkeypatch):
     monkeypatch.setattr(cli, "dispatch", dispatch)
     with pytest.raises(FileNotFoundError):
         cli.main(["twin"])
+
+
+def test_a_time_of_a_robot_is_told_as_time_of_day_and_one_of_a_twin_in_lockstep_in_seconds():
+    assert when(12.34) == "12.3 s"
+    assert re.fullmatch(r"2026-11-2\d \d\d:\d\d:\d\d\.5", when(1_795_746_224.55))

@@ -4,6 +4,7 @@ import json
 import re
 
 import pytest
+from foxglove import layouts
 
 from lira.hal.bus.topics import TOPICS
 from lira.hal.messages import Reason
@@ -88,6 +89,27 @@ def test_every_panel_of_the_layout_has_its_place_and_its_settings():
         return [node] if isinstance(node, str) else places(node["first"]) + places(node["second"])
 
     assert sorted(places(layout["layout"])) == sorted(layout["configById"])
+
+
+CONFIGS = {
+    "3D": layouts.ThreeDeeConfig,
+    "Image": layouts.ImageConfig,
+    "StateTransitions": layouts.StateTransitionsConfig,
+    "Plot": layouts.PlotConfig,
+    "Indicator": layouts.IndicatorConfig,
+    "RawMessages": layouts.RawMessagesConfig,
+    "DiagnosticSummary": layouts.DiagnosticsSummaryConfig,
+}
+
+
+def test_every_setting_is_one_that_foxglove_has():
+    for name, panel in load_layout()["configById"].items():
+        known = CONFIGS[name.split("!")[0]]()._to_dict().keys() | {"title"}
+        assert panel.keys() <= known, name
+        for line in panel.get("paths", []):
+            assert line.keys() <= layouts.PlotSeries(value="")._to_dict().keys(), name
+    model = load_layout()["configById"]["3D!robot"]["layers"]["model"]
+    assert model.keys() - {"layerId"} <= layouts.BaseRendererUrdfLayerSettings()._to_dict().keys()
 
 
 def test_the_light_of_the_layout_has_a_colour_for_every_reason():

@@ -1,5 +1,6 @@
 """The wheels that go to the robot's computer, and how they are installed there."""
 
+import shlex
 import subprocess
 import sys
 import tempfile
@@ -34,11 +35,11 @@ def collect(folder: Path | None, name: str) -> list[File]:
     return files
 
 
-def steps(name: str, files: list[File], *, offline: bool) -> tuple[str, ...]:
+def steps(name: str, files: list[File], python3: str, *, offline: bool) -> tuple[str, ...]:
     """Lines of the shell that make the environment, or bring it up to date.
 
-    Ours is put in anew even if its version is the same; what it needs comes from the folder first, `offline` only
-    from there.
+    `python3` is the interpreter there to make it with. Ours is put in anew even if its version is the same; what it
+    needs comes from the folder first, `offline` only from there.
     """
     wheels, python = f"{share(name)}/wheels", f"{share(name)}/venv/bin/python"
     ours = next(file.path for file in files if Path(file.path).match(OURS))
@@ -47,7 +48,7 @@ def steps(name: str, files: list[File], *, offline: bool) -> tuple[str, ...]:
     source = f"--find-links {wheels}{' --no-index' if offline else ''}"
     pip = f"{python} -m pip install --quiet --disable-pip-version-check"
     return (
-        f"[ -x {python} ] || python3 -m venv {share(name)}/venv",
+        f"[ -x {python} ] || {shlex.quote(python3)} -m venv {share(name)}/venv",
         f"{pip} {source}{limits} '{ours}[{EXTRAS}]'",
         f"{pip} --no-deps --force-reinstall {ours}",
     )

@@ -98,10 +98,12 @@ class Plan:
             "fi",
         ]
 
-    def shown(self) -> str:
+    def shown(self, before: list[str]) -> str:
         """All of it for a person."""
-        commands = [*self.install, *self.start()]
-        blocks = [*(file.shown() for file in self.files), "\n".join(["--- then", *commands])]
+        blocks = [
+            *(file.shown() for file in self.files),
+            f"--- by this script, which unpacks them\n{self.script(before)}",
+        ]
         if self.notes:
             blocks.append("\n".join(["--- yourself, once", *self.notes]))
         return "\n\n".join(blocks)

@@ -17,6 +17,7 @@ from lira.tools.lifecycle.services import SETUP, config_folder, target_name, uni
 from lira.tools.lifecycle.setup import Setup
 from lira.tools.lifecycle.table import rows
 
+OLDEST = (3, 11)
 ROSBOT_PLACE = "/etc/udev/rules.d/99-lira-rosbot.rules"
 
 
@@ -30,8 +31,23 @@ def for_laptop(setup: Setup, facts: Facts, python: str, folder: Path, keys: Path
     return Plan(setup.name, setup.processes, tuple(files), notes=notes)
 
 
-def for_robot(setup: Setup, facts: Facts, brought: Sequence[File], keys: Path | None, *, offline: bool = False) -> Plan:
-    """The plan of the robot's computer. `brought` are the wheels for its environment."""
+def for_robot(
+    setup: Setup,
+    facts: Facts,
+    brought: Sequence[File],
+    keys: Path | None,
+    *,
+    python3: str = "python3",
+    offline: bool = False,
+) -> Plan:
+    """The plan of the robot's computer. `brought` are the wheels for its environment, which `python3` there makes.
+
+    Raises `ConfigError` for a Python that is too old, and for files and keys that are not there.
+    """
+    if facts.python < OLDEST:
+        found = ".".join(map(str, facts.python)) if any(facts.python) else "none"
+        what = f"Python {OLDEST[0]}.{OLDEST[1]} is needed there, and {python3} is {found}"
+        raise ConfigError(what, "Install one beside it, and name it: --python python3.11.")
     name = setup.name
     python = f"{facts.home}/{packages.share(name)}/venv/bin/python"
     setup, taken = _with_files(setup, facts)
@@ -43,7 +59,7 @@ def for_robot(setup: Setup, facts: Facts, brought: Sequence[File], keys: Path | 
         name,
         setup.processes,
         tuple(files),
-        packages.steps(name, list(brought), offline=offline),
+        packages.steps(name, list(brought), python3, offline=offline),
         (f"{packages.share(name)}/venv/",),
         (*_udev(setup, ROSBOT_PLACE), groups),
     )

@@ -12,21 +12,23 @@ from lira.tools.launch.processes import ProcessError
 LOOK_S = 30.0
 INSTALL_S = 1800.0  # packages come over somebody's network
 CONNECT_S = 10
-LOOK = """cd "$HOME"
+MARK = "--- lira ---"  # what a shell prints at its start comes before it
+LOOK = f"""cd "$HOME"
+echo '{MARK}'
 pwd -P
 systemctl --version 2>/dev/null | sed -n '1s/^systemd \\([0-9]*\\).*/\\1/p' | grep . || echo 0
-python3 -c 'import sys; print("%d.%d" % sys.version_info[:2])' 2>/dev/null || echo none
+"$2" -c 'import sys; print(*sys.version_info[:2])' 2>/dev/null || echo 0 0
 cat "$1" 2>/dev/null || true
 """
 
 
 @dataclass(frozen=True, slots=True)
 class Facts:
-    """What matters of a machine: its user's home, the version of its systemd (0: none), its Python, what was there."""
+    """What matters of a machine: its user's home, the versions of its systemd (0: none) and Python, what was there."""
 
     home: str
     systemd: int
-    python: str
+    python: tuple[int, ...]
     before: tuple[str, ...] = ()
 
 
@@ -47,14 +49,16 @@ class Target:
         """The machine, for a person."""
         return self._host or "this machine"
 
-    def look(self, name: str) -> Facts:
+    def look(self, name: str, python: str = "python3") -> Facts:
         """Find out what matters; nothing is changed."""
-        lines = self.run(LOOK, manifest_of(name), timeout_s=LOOK_S).splitlines()
+        _, _, told = self.run(LOOK, manifest_of(name), python, timeout_s=LOOK_S).partition(f"{MARK}\n")
+        lines = told.splitlines()
         if len(lines) < 3 or not lines[1].isdecimal():
             raise ProcessError(
                 f"{self.where} does not answer as a Unix machine does", "See what its shell prints first."
             )
-        return Facts(lines[0], int(lines[1]), lines[2], tuple(lines[3:]))
+        version = tuple(int(part) for part in lines[2].split())
+        return Facts(lines[0], int(lines[1]), version, tuple(lines[3:]))
 
     def put(self, plan: Plan, facts: Facts) -> str:
         """Do what a plan says, and return what was said there."""

@@ -3,7 +3,8 @@
 The topics are found by their types: one scan, one picture, one command. A bag's own clock is the one that counts.
 """
 
-from collections.abc import Iterator, Mapping, Sequence
+import struct
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -16,19 +17,21 @@ from lira.fusion.preprocess import Preprocessor
 from lira.hal.bus.sensors import Stamped, observation_of
 from lira.hal.errors import ConfigError, SensorError, StorageError
 from lira.hal.messages import Applied, CompressedImage, Image, LaserScan, Source, Twist, TwistStamped
+from lira.hal.messages.bounds import check
 from lira.hal.messages.codec import ros_type_of
 from lira.hal.messages.ros_table import CODECS, TYPES
 from lira.hal.profile import RobotProfile
 from lira.tools.export.demonstrations import Shown
 
+Heard = tuple[float, str, Any]  # when, for what, and which message
 BREAK_S = 2.0  # of silence: the next episode
 ROLES: dict[str, tuple[type, ...]] = {
     "scan": (LaserScan,),
     "camera": (CompressedImage, Image),
     "command": (Twist, TwistStamped, Applied),
 }
-# What a message that is none of its type raises when it is read.
-MALFORMED = (ValueError, TypeError, KeyError, AttributeError, IndexError)
+# What reading a message raises that is none of its type.
+MALFORMED = (AnyReaderError, struct.error, ValueError, TypeError, LookupError, AttributeError, AssertionError)
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,14 +52,21 @@ def read_bag(path: Path, profile: RobotProfile, topics: Mapping[str, str]) -> It
     try:
         with AnyReader([path], default_typestore=TYPES) as bag:
             chosen = choose({each.topic: each.msgtype for each in bag.connections}, topics)
-            wanted = [each for each in bag.connections if each.topic in {one.topic for one in chosen}]
-            heard = (
-                (time_ns / 1e9, connection.topic, bag.deserialize(data, connection.msgtype))
-                for connection, time_ns, data in bag.messages(wanted)
-            )
-            yield from shown_by(heard, chosen, profile)
+            yield from shown_by(_values(bag, {each.topic: each for each in chosen}), profile)
     except (AnyReaderError, OSError) as error:
         raise StorageError(f"{path} is no bag that can be read: {error}", "Give the folder of a bag.") from error
+
+
+def _values(bag: AnyReader, chosen: Mapping[str, Chosen]) -> Iterator[Heard]:
+    """Yield what can be read of the topics that were chosen."""
+    for connection, time_ns, data in bag.messages([each for each in bag.connections if each.topic in chosen]):
+        each = chosen[connection.topic]
+        try:
+            value = CODECS[each.kind].from_ros(bag.deserialize(data, connection.msgtype))
+            check(value)
+        except MALFORMED:
+            continue
+        yield time_ns / 1e9, each.role, value
 
 
 def choose(types: Mapping[str, str], named: Mapping[str, str]) -> tuple[Chosen, ...]:
@@ -81,21 +91,13 @@ def _chosen(role: str, types: Mapping[str, str], named: str | None) -> Chosen | 
     return next((Chosen(topic, role, kind) for topic, kind in fitting.items()), None)
 
 
-def shown_by(
-    heard: Iterator[tuple[float, str, Any]], chosen: Sequence[Chosen], profile: RobotProfile
-) -> Iterator[Shown]:
-    """Yield what was shown by messages of ROS, each with its time and its topic, in order. Pure."""
-    roles, preprocess = {each.topic: each for each in chosen}, Preprocessor(profile)
-    newest: dict[str, Stamped] = {}
+def shown_by(heard: Iterable[Heard], profile: RobotProfile) -> Iterator[Shown]:
+    """Yield what was shown, by what was measured and commanded, in order. Pure."""
+    preprocess, newest = Preprocessor(profile), dict[str, Stamped]()
     due_s, last_s, episode, number = 0.0, float("-inf"), 0, 0
-    for now_s, topic, message in heard:
-        role = roles[topic]
-        try:
-            value = CODECS[role.kind].from_ros(message)
-        except MALFORMED:
-            continue
-        if role.role != "command":
-            newest[role.role] = replace(_as_rgb(value), stamp_s=now_s)
+    for now_s, role, value in heard:
+        if role != "command":
+            newest[role] = replace(_as_rgb(value), stamp_s=now_s)
             continue
         twist = _twist(value)
         if twist is None or is_rest(action := to_action(twist, profile.base)):
@@ -105,8 +107,7 @@ def shown_by(
         last_s = now_s
         if now_s < due_s:
             continue
-        due_s = max(due_s + profile.period_s, now_s)
-        number += 1
+        due_s, number = max(due_s + profile.period_s, now_s), number + 1
         try:
             features = preprocess(observation_of(number, now_s, newest))
         except SensorError:

@@ -1,9 +1,11 @@
 """What somebody showed elsewhere, as labels for a learner here: a log that a run goes on from."""
 
+import math
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from pathlib import Path
 
+from lira.fusion.log.label_file import LIMIT
 from lira.fusion.log.label_log import Demonstration, DemonstrationLog
 from lira.fusion.preprocess import Features
 from lira.hal.errors import StorageError
@@ -11,6 +13,7 @@ from lira.hal.messages import Action, Driver
 from lira.hal.profile import RobotProfile
 
 NOTHING: Action = (0.0, 0.0)
+MOST_LETTERS = 32  # of a name in the log
 
 
 @dataclass(frozen=True, slots=True)
@@ -26,10 +29,11 @@ class Shown:
 
 @dataclass(slots=True)
 class Tally:
-    """How many were taken, and of how many the action was cut to what the robot can do."""
+    """How many were taken, of how many the action was cut to what the robot can do, and how many had none."""
 
     taken: int = 0
     clipped: int = 0
+    without: int = 0
 
 
 def keep(shown: Iterable[Shown], path: Path, profile: RobotProfile, say: Callable[[str], None] = print) -> Tally:
@@ -37,24 +41,34 @@ def keep(shown: Iterable[Shown], path: Path, profile: RobotProfile, say: Callabl
     tally = Tally()
     with DemonstrationLog(path, profile, say=say) as log:
         for number, each in enumerate(shown):
-            action = _within(each.action)
-            log.append(
-                Demonstration(
-                    each.stamp_s,
-                    number,
-                    each.episode,
-                    each.source,
-                    action,
-                    NOTHING,
-                    stored=True,
-                    features=each.features,
-                )
-            )
+            if not all(map(math.isfinite, each.action)):
+                tally.without += 1
+                continue
+            log.append(_label(number, each))
             tally.taken += 1
-            tally.clipped += action != each.action
+            tally.clipped += _within(each.action) != each.action
     if not tally.taken:
         raise StorageError("there is nothing to learn from in it", "Is it the right file, and were all sensors there?")
     return tally
+
+
+def _label(number: int, shown: Shown) -> Demonstration:
+    for name, array in shown.features.items():
+        if not (array.min() >= 0.0 and array.max() <= LIMIT):
+            raise StorageError(
+                f"the {name} of demonstration {number} is not within 0 and 1", "Scale it as networks here see it."
+            )
+    source = shown.source if shown.source.isidentifier() and len(shown.source) <= MOST_LETTERS else Driver.HUMAN
+    return Demonstration(
+        shown.stamp_s,
+        number,
+        shown.episode,
+        source,
+        _within(shown.action),
+        NOTHING,
+        stored=True,
+        features=shown.features,
+    )
 
 
 def _within(action: Action) -> Action:

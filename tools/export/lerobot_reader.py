@@ -26,6 +26,8 @@ from lira.tools.export.demonstrations import Shown
 Frames = Literal["all", "interventions", "buffer"]
 CHOSEN_BY = {"interventions": "intervention", "buffer": "in_buffer"}
 PICTURES = ("video", "image")
+# What reading a data set raises that is damaged, or does not keep to its own description.
+MALFORMED = (OSError, pa.ArrowException, av.FFmpegError, LookupError, ValueError, TypeError, AttributeError)
 EARLY_S = 1e-3  # a frame's time is rounded
 
 
@@ -69,7 +71,7 @@ def read_lerobot(
                 shown = {name: next(each, None) for name, each in pictures.items()}
                 if chosen[number]:
                     yield _shown(row, int(episode["episode_index"]), sources, shown, profile)
-    except (OSError, pa.ArrowException, av.FFmpegError, KeyError) as error:
+    except MALFORMED as error:
         raise StorageError(f"{folder} cannot be read: {error}", "Is the data set whole?") from error
 
 

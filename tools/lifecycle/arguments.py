@@ -36,7 +36,12 @@ def add_setup(parser: argparse.ArgumentParser) -> None:
     add("--without", action="append", default=[], metavar="PROCESS", help="leave one out; may be given several times")
     add("--method", default="plus", help=f"way of teaching, as in `lira fusion` {DEFAULT}")
     add("--policy", metavar="POLICY", help="what drives, as in `lira drive`")
-    add("--run", type=Path, metavar="DIR", help="folder for what is learned (default: runs/<method>-<world or name>)")
+    add(
+        "--run",
+        type=Path,
+        metavar="DIR",
+        help="folder for what is learned and recorded (default: in runs/, by method and world)",
+    )
     add("--page-port", type=int, metavar="PORT", help=f"of the page in the browser (default: {PAGE_PORT})")
 
 
@@ -50,7 +55,7 @@ def setup_of(args: argparse.Namespace, ports: Ports) -> Setup:
     if args.robot is not None and (args.profile or args.listen):
         raise ConfigError("--profile and --listen are the twin's", "A real robot has its own: leave them out.")
     world = "" if args.robot is not None else args.world or WORLD
-    folder = args.run or run_folder(args.name, args.method, world)
+    folder = args.run or run_folder(args.name, args.method if chosen_set == "teach" else chosen_set, world)
     return Setup(
         name=args.name,
         endpoint=endpoint_of(args.robot) if args.robot is not None else args.listen or f"127.0.0.1:{ports.twin}",

@@ -5,6 +5,7 @@ import signal
 import sys
 import time
 from collections.abc import Callable
+from contextlib import suppress
 from pathlib import Path
 
 import msgspec
@@ -56,7 +57,8 @@ def take_down(name: str, say: Say) -> bool:
     pid = folder.supervisor()
     if pid is None:
         return _stop_services(name, say)
-    os.kill(pid, signal.SIGTERM)
+    with suppress(ProcessLookupError):  # it has ended just now
+        os.kill(pid, signal.SIGTERM)
     said: set[str] = set()
     until_s = time.monotonic() + DOWN_S
     while folder.supervisor() == pid:
@@ -78,7 +80,7 @@ def _stop_services(name: str, say: Say) -> bool:
 
 
 def _say_stopped(folder: StateFolder, said: set[str], say: Say) -> None:
-    for process in _processes(folder):
+    for process in sorted(_processes(folder), key=lambda process: process.since_s):
         if process.phase is Phase.STOPPED and process.name not in said:
             said.add(process.name)
             say(f"{process.name} stopped")

@@ -30,10 +30,13 @@ class Rate:
 
 
 class Line(Generic[M]):
-    """Listens to one topic. `newest` is None, and `arrived_s` minus infinity, until it came."""
+    """Listens to one topic, which comes `usual_hz` times a second, or as often as the table says.
 
-    def __init__(self, bus: Bus, topic: Topic[M]) -> None:
-        self._topic = topic
+    `newest` is None, and `arrived_s` minus infinity, until it came.
+    """
+
+    def __init__(self, bus: Bus, topic: Topic[M], usual_hz: float | None = None) -> None:
+        self._key, self._usual_hz = topic.key, usual_hz or topic.rate_hz
         self._reader = bus.reader(topic, DEPTH)
         self._rate = Rate()
         self.newest: M | None = None
@@ -48,4 +51,4 @@ class Line(Generic[M]):
     def state(self, now_s: float) -> TopicState:
         """What is told about it."""
         age_s = None if self.newest is None else round(now_s - self.arrived_s, 3)
-        return TopicState(self._topic.key, round(self._rate.hz(now_s), 1), self._topic.rate_hz, age_s)
+        return TopicState(self._key, round(self._rate.hz(now_s), 1), self._usual_hz, age_s)

@@ -13,7 +13,7 @@ from typing import Any
 
 from lira.hal.bus.bus import Bus
 from lira.hal.bus.endpoint import is_loopback
-from lira.hal.bus.sensors import sensors_of
+from lira.hal.bus.sensors import Sensor, sensors_of
 from lira.hal.bus.topics import APPLIED, DECISION, DIAGNOSTICS, OPERATOR_ANSWER, SESSION, SIM_STATE
 from lira.hal.errors import LiraError
 from lira.hal.messages import Reason
@@ -31,6 +31,12 @@ POLL_S = 0.1
 WRITE_S = 0.5
 
 
+def rate_of(sensor: Sensor, profile: RobotProfile) -> float | None:
+    """How often the robot of a profile measures with a sensor; None where the profile does not say."""
+    part = getattr(profile, "lidar" if sensor.name == "scan" else sensor.name, None)
+    return getattr(part, "rate_hz", None)
+
+
 class Monitor:
     """Listens to a robot's sensors, and to what tells who drives and how it is."""
 
@@ -40,8 +46,8 @@ class Monitor:
         self._session, self._answer = Line(bus, SESSION), Line(bus, OPERATOR_ANSWER)
         self._diagnostics, self._truth = Line(bus, DIAGNOSTICS), Line(bus, SIM_STATE)
         sensors = [sensor for sensor in sensors_of(profile) if pictures or sensor.compress is None]
-        self._lines: list[Line[Any]] = [*(Line(bus, sensor.topic) for sensor in sensors), self._applied, self._decision]
-        self._lines += [self._session, self._answer, self._diagnostics, self._truth]
+        self._lines: list[Line[Any]] = [Line(bus, sensor.topic, rate_of(sensor, profile)) for sensor in sensors]
+        self._lines += [self._applied, self._decision, self._session, self._answer, self._diagnostics, self._truth]
 
     def listen(self) -> None:
         """Take in what came."""

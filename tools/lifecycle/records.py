@@ -31,6 +31,11 @@ class State(msgspec.Struct, frozen=True):
     processes: tuple[ProcessState, ...]
 
     @property
+    def is_monitored(self) -> bool:
+        """Whether one of them listens to the robot."""
+        return any(process.name == "monitor" for process in self.processes)
+
+    @property
     def runs(self) -> bool:
         """Whether all of it runs."""
         return all(process.phase is Phase.RUNS for process in self.processes)

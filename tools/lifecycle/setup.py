@@ -15,7 +15,7 @@ class Setup(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tru
 
     `twin` are the words for `lira twin`, and `world` is its world, "" for a robot that is somewhere else: its own
     machine runs it, with the words `robot` for `lira robot`. `processes` are the rows of the table that were chosen, by
-    name. `folder` is where the learner keeps what it learns.
+    name. `folder` is the run's: what is learned and recorded.
     """
 
     name: str = DEFAULT_ROBOT
@@ -45,6 +45,6 @@ def endpoint_of(host: str) -> str:
     return f"[{host}]:{PORT}" if ":" in host and not host.startswith("[") else f"{host}:{PORT}"
 
 
-def run_folder(setup_name: str, method: str, world: str) -> Path:
-    """Where the learner keeps what it learns, unless somebody says where: it goes on there the next time."""
-    return Path("runs") / f"{method.replace(':', '-')}-{Path(world).stem or setup_name}"
+def run_folder(setup_name: str, what: str, world: str) -> Path:
+    """Where what is learned and recorded goes, unless somebody says where; a learner goes on there the next time."""
+    return Path("runs") / f"{what.replace(':', '-')}-{Path(world).stem or setup_name}"

@@ -22,8 +22,8 @@ class Status(msgspec.Struct, frozen=True):
 
     @property
     def is_well(self) -> bool:
-        """Whether all of it runs, and the robot is heard."""
-        return self.state is not None and self.state.runs and self.heard is not None
+        """Whether all of it runs, and the robot is heard where somebody listens."""
+        return self.state is not None and self.state.runs and (self.heard is not None or not self.state.is_monitored)
 
 
 def look(name: str, now_s: float) -> Status:
@@ -66,7 +66,8 @@ def as_text(status: Status) -> str:
     head = f"'{status.name}' is up for {_for(now_s - state.since_s)}{by}: {state.setup.where}"
     blocks = [head, _processes(state, now_s)]
     if heard is None:
-        blocks.append("nothing is heard of the robot: see lira logs monitor")
+        if state.is_monitored:
+            blocks.append("nothing is heard of the robot: see lira logs monitor")
         return "\n\n".join(blocks)
     blocks.append(_topics(heard, now_s - heard.time_s))
     said = [("link", heard.link), ("governor", heard.governor), (heard.who, f"{heard.why} {heard.now}".strip())]

@@ -28,7 +28,8 @@ from lira.tools.lifecycle.table import Process, rows
 
 LOOK_S = 0.1
 MOST_LOG_BYTES = 4 * 2**20
-LONGEST_NOTE = 4096
+LONGEST_NOTE, MOST_NOTES = 4096, 64  # bytes, and so many at a look
+LONGEST_FOLDER = 64  # the path of a socket has at most 107 characters
 Say = Callable[[str], None]
 
 
@@ -56,7 +57,7 @@ class Supervised:
 
     def look(self, now_s: float, say: Say, *, held: bool) -> None:
         """Hear it, notice its end, and start it when that is due; `held`: not yet."""
-        self._hear(now_s)
+        self._hear(now_s, say)
         if self._child is not None and self.restarts.is_hung(now_s):
             say(f"{self.process.name} gives no sign of life: it is killed")
             self._child.signal(signal.SIGKILL)
@@ -98,15 +99,16 @@ class Supervised:
             return
         self.restarts.started(now_s)
 
-    def _hear(self, now_s: float) -> None:
+    def _hear(self, now_s: float, say: Say) -> None:
         with contextlib.suppress(BlockingIOError):
-            while True:
+            for _ in range(MOST_NOTES):
                 lines = self.ear.recv(LONGEST_NOTE).decode(errors="replace").splitlines()
                 if self._child is None:
                     continue  # of one that has gone
                 if READY in lines:
                     self.restarts.ready(now_s)
                     self.says = next((line.partition("=")[2] for line in lines if line.startswith("STATUS=")), "")
+                    say(f"{self.process.name}: {self.says or self.process.does}")
                 if ALIVE in lines:
                     self.restarts.alive(now_s)
 
@@ -120,7 +122,10 @@ class Supervisor:
         self._say = say
         self._since_s = time.monotonic()
         self._written: State | None = None
-        self._sockets = Path(tempfile.mkdtemp(prefix="lira-"))
+        temporary = tempfile.gettempdir()
+        self._sockets = Path(
+            tempfile.mkdtemp(prefix="lira-", dir=temporary if len(temporary) < LONGEST_FOLDER else "/tmp")
+        )
         self._all = [Supervised(row, setup, folder.log(row.name), self._sockets) for row in rows(setup)]
 
     def run(self, stop: threading.Event) -> None:
@@ -139,12 +144,12 @@ class Supervisor:
         return self
 
     def __exit__(self, *_: object) -> None:
-        for each in reversed(self._all):
-            each.stop(self._say)
-            self._write()
-        for each in self._all:
-            each.close()
-        shutil.rmtree(self._sockets, ignore_errors=True)
+        with contextlib.ExitStack() as ends:  # whatever one of them fails with, the others are stopped
+            ends.callback(shutil.rmtree, self._sockets, ignore_errors=True)
+            for each in self._all:
+                ends.callback(each.close)
+                ends.callback(self._write)
+                ends.callback(each.stop, self._say)
 
     def _write(self) -> None:
         state = State(self._setup, os.getpid(), self._since_s, tuple(each.state for each in self._all))

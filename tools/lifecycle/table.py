@@ -53,7 +53,7 @@ def _serve(setup: Setup) -> list[str]:
 
 def _learner(setup: Setup) -> list[str]:
     words = ["fusion", *_reach(setup), "--method", setup.method, "--paused", "--run", setup.folder]
-    return [*words, "--layout", str(setup.layout)]
+    return [*words, "--layout", str(setup.layout), "--no-record"]  # that is a process of its own here
 
 
 def _driver(setup: Setup) -> list[str]:
@@ -89,7 +89,7 @@ PROCESSES: tuple[Process, ...] = (
     Process(
         "recorder",
         "records all that is on the bus",
-        lambda setup: ["record", *_reach(setup)],
+        lambda setup: ["record", *_reach(setup), "--run", setup.folder],
         packages=("mcap",),
     ),
     Process("learner", "decides, drives and learns", _learner, packages=("torch",)),

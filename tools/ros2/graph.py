@@ -7,7 +7,7 @@ import subprocess
 from collections.abc import Iterator
 from dataclasses import dataclass
 
-from lira.hal.bus.endpoint import check_address
+from lira.hal.bus.endpoint import check_address, is_loopback
 from lira.hal.errors import ConfigError
 from lira.tools.launch.processes import dying_with_parent, lira_command
 from lira.tools.options import add_ros_domain
@@ -38,14 +38,17 @@ class Graph:
         ]
 
 
-def graph_of(address: str, domain: int, namespace: str) -> Graph:
+def graph_of(address: str, domain: int, namespace: str, *, insecure: bool = False) -> Graph:
     """Return the graph of the router at an address; for "" one of its own, and for `own:HOST:PORT` there.
 
-    Raises `ConfigError`.
+    Raises `ConfigError`, also for a router that other machines reach, unless `insecure`: such a graph knows no keys.
     """
     own = not address or address.startswith("own:")
     router = address.removeprefix("own:") or OWN_ROUTER
     check_address(router)
+    if not (insecure or is_loopback(router)):
+        what = f"anybody in the ROS 2 graph of {router} could drive the robot"
+        raise ConfigError(what, "Take a router on this machine, or say --insecure: rmw_zenoh has no keys here.")
     return Graph(router, own, domain, namespace)
 
 
@@ -77,10 +80,12 @@ def offered(args: argparse.Namespace) -> Iterator[None]:
     if os.environ.get(KEYS) and args.ros2_keys is None:
         what = "the robot has keys, and ROS has none to command with"
         raise ConfigError(what, "Make some with: lira keys enroll ros; and name them with --ros2-keys keys/ros.")
+    graph_of(args.ros2, args.ros2_domain, args.ros2_namespace, insecure=args.insecure)
     host, _, port = args.listen.rpartition(":")
     address = f"127.0.0.1:{port}" if host in ("0.0.0.0", "[::]") else args.listen
     words = ["ros2", "--offer", args.ros2, "--connect", address, "--name", args.name]
     words += ["--domain", str(args.ros2_domain), "--namespace", args.ros2_namespace]
+    words += ["--insecure"] if args.insecure else []
     process = subprocess.Popen(
         dying_with_parent(lira_command(*words)),
         stdin=subprocess.DEVNULL,

@@ -84,6 +84,7 @@ def offer(robot: str, address: str, graph: Graph, stop: threading.Event, ready: 
             listen=graph.router if graph.own else None,
             domain=graph.domain,
             namespace=graph.namespace,
+            insecure=True,  # what is not on this machine was asked for (`graph_of`)
         )
         held.callback(node.close)
         bus = Bus(robot, connect=address)

@@ -55,9 +55,9 @@ def live(mode: str, seconds: float) -> Row:
 
 
 def listen(robot: str, endpoint: str, seconds: float) -> list[tuple[float, float]]:
-    """Stamp and time of publication of every scan, once they come, on the machine's clock."""
+    """Stamp and time of publication of every scan, once they come, on this machine's monotonic clock."""
+    ahead_s = unix_offset_s(time.monotonic)  # as the robot measured it: on the bus times count from 1970
     bus = Bus(robot, connect=endpoint)
-    offset_s = unix_offset_s(time.monotonic)  # as the robot measured it
     reader = bus.reader(SCAN, depth=16)
     scans: list[tuple[float, float]] = []
     until_s = time.monotonic() + ARRIVAL_S
@@ -66,7 +66,7 @@ def listen(robot: str, endpoint: str, seconds: float) -> list[tuple[float, float
             if not scans:
                 until_s = time.monotonic() + seconds
             if received.attachment is not None:
-                scans.append((received.message.stamp_s - offset_s, received.attachment.time_s - offset_s))
+                scans.append((received.message.stamp_s - ahead_s, received.attachment.time_s - ahead_s))
         time.sleep(POLL_S)
     bus.close()
     return scans

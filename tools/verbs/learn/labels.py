@@ -111,6 +111,7 @@ def explain(args: argparse.Namespace) -> int:
     from lira.tools.labels.choose import nearest, one_of
     from lira.tools.labels.relearn import relearn
     from lira.tools.labels.words import pair, part_rows, part_table
+    from lira.tools.output.when import when
 
     path = args.file[0]
     labels = read_heads(path)
@@ -122,7 +123,7 @@ def explain(args: argparse.Namespace) -> int:
     seen = next(islice(read_demonstrations(path), at, None)).features
     rows = part_rows(novice.explain(seen), learned, labels)
     action, alone, deviation = novice.act(seen), novice.alone(seen), novice.deviation(seen)
-    where = f"label {at} (run {label.run}, lap {label.lap}, {label.stamp_s:.1f} s) says {pair(label.action)}"
+    where = f"label {at} (run {label.run}, lap {label.lap}, {when(label.stamp_s)}) says {pair(label.action)}"
     head = (
         f"{where} by {label.source}; the novice does {pair(action)}, alone {pair(alone)}, give or take "
         f"{deviation[0]:.2f}, {deviation[1]:.2f}"

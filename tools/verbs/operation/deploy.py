@@ -48,6 +48,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     add("--wheels", type=Path, metavar="DIR", help="wheels to install there (default: one built from this checkout)")
     add("--offline", action="store_true", help="install from these wheels alone: the robot reaches no package index")
+    add("--python", default="python3", metavar="NAME", help=f"Python there that makes its environment {DEFAULT}")
     add("words", nargs="*", metavar="-- WORDS", help="words for `lira robot`: --base, --lidar, --camera, ...")
     for machine in (laptop, robot):
         add = machine.add_argument
@@ -67,10 +68,11 @@ def run(args: argparse.Namespace) -> int:
         print(script if args.dry_run else target.run(script))
         return 0
     plan = laptop_plan(args, target) if args.machine == "laptop" else robot_plan(args, target)
+    facts = target.look(args.name)
     if args.dry_run:
-        print(f"on {target.where}, in the home folder of its user:\n\n{plan.shown()}")
+        print(f"on {target.where}, in the home folder of its user:\n\n{plan.shown(list(facts.before))}")
         return 0
-    print(target.put(plan, target.look(args.name)))
+    print(target.put(plan, facts))
     if plan.notes:
         print("\n".join(["yourself, once:", *plan.notes]))
     return 0
@@ -98,8 +100,9 @@ def robot_plan(args: argparse.Namespace, target: "Target") -> "Plan":
     from lira.tools.deploy.packages import collect
     from lira.tools.deploy.plans import for_robot
 
-    setup = robot_setup(args)
-    return for_robot(setup, target.look(setup.name), collect(args.wheels, setup.name), args.keys, offline=args.offline)
+    setup, python3 = robot_setup(args), args.python
+    facts = target.look(setup.name, python3)
+    return for_robot(setup, facts, collect(args.wheels, setup.name), args.keys, python3=python3, offline=args.offline)
 
 
 def robot_setup(args: argparse.Namespace) -> "Setup":

@@ -55,5 +55,6 @@ def run(args: argparse.Namespace) -> int:
         shown = read_bag(args.file, profile, {role: topic for role in ROLES if (topic := getattr(args, role))})
     tally = keep(shown, path, profile)
     cut = f"; {tally.clipped} of them were more than the robot can do, and are cut" if tally.clipped else ""
-    print(f"{tally.taken} demonstrations are in {path}{cut}")
+    without = f"; {tally.without} without an action are left out" if tally.without else ""
+    print(f"{tally.taken} demonstrations are in {path}{cut}{without}")
     return 0

@@ -32,7 +32,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
     add_client(parser)
     add = parser.add_argument
-    add("--out", type=Path, metavar="DIR", help="folder of the recording (default: recordings/<date-time>)")
+    where = parser.add_mutually_exclusive_group()
+    where.add_argument("--out", type=Path, metavar="DIR", help="its folder (default: recordings/<date-time>)")
+    where.add_argument("--run", type=Path, metavar="DIR", help="a run's folder: one more recording in it")
     add("--split", type=natural, default=2000, metavar="MB", help=f"begin another file after so much {DEFAULT}")
     add("--memory", type=natural, default=64, metavar="MB", help=f"what may wait for a slow disk {DEFAULT}")
     add("--recover", type=Path, metavar="FILE", help="instead: give what was cut off an index again")
@@ -59,12 +61,12 @@ def record(args: argparse.Namespace, stop: "Event") -> int:
     from lira.tools.cli import version
     from lira.tools.launch.lifetime import CLOSE_S
     from lira.tools.launch.notify import Notifier
-    from lira.tools.recording.beside import READY
+    from lira.tools.recording.beside import READY, new_folder
     from lira.tools.recording.recorder import Recorder, listen
     from lira.tools.recording.writer import RecordingWriter
     from lira.tools.runs.reach import say
 
-    folder = args.out or Path("recordings") / f"{datetime.now():%Y%m%d-%H%M%S}"
+    folder = new_folder(args.run) if args.run else args.out or Path("recordings") / f"{datetime.now():%Y%m%d-%H%M%S}"
     notifier = Notifier.from_environment()
     bus = Bus(args.name, connect=args.connect, watch=True)
     try:

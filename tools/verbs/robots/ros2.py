@@ -155,7 +155,7 @@ def run_offer(args: argparse.Namespace) -> int:
     from lira.tools.ros2.graph import graph_of
     from lira.tools.ros2.offer import offer
 
-    graph = graph_of(args.offer, args.domain, args.namespace)
+    graph = graph_of(args.offer, args.domain, args.namespace, insecure=args.insecure)
 
     def ready() -> None:
         first, *rest = graph.told()

@@ -1,0 +1,12 @@
+"""A time on a robot's clock, in words: a robot in real time counts from 1970, a twin in lockstep from its start."""
+
+from datetime import UTC, datetime
+
+from lira.hal.clock import COUNTS_FROM_1970_S
+
+
+def when(stamp_s: float) -> str:
+    """Return the time of day here, or seconds."""
+    if stamp_s < COUNTS_FROM_1970_S:
+        return f"{stamp_s:.1f} s"
+    return f"{datetime.fromtimestamp(stamp_s, UTC).astimezone():%Y-%m-%d %H:%M:%S}.{int(stamp_s * 10) % 10}"
