@@ -19,8 +19,8 @@ from lira.hal.bus.connection import Connection
 from lira.hal.bus.reader import take
 from lira.hal.bus.topics import QUESTION_BYTES
 from lira.hal.errors import CodecError
-from lira.hal.rmw.services import TRIGGER, encode_answer
 from lira.hal.rmw.services import Answer as TriggerAnswer
+from lira.hal.rmw.services import encode_answer
 
 QUESTIONS = 256  # that wait at most; each round answers no more
 SHOWN_REASON = 300  # characters of why a question was refused
@@ -75,7 +75,7 @@ class Question:
     def _trigger(self, answer: TriggerAnswer) -> None:
         self.answered = True
         with self._query as query:
-            query.reply(query.key_expr, encode_answer(TRIGGER, answer))
+            query.reply(query.key_expr, encode_answer(answer))
 
 
 class Questions:

@@ -24,7 +24,7 @@ from lira.hal.rmw.attachment import RmwAttachment, gid_of
 from lira.hal.rmw.hashes import type_hash
 from lira.hal.rmw.names import ANY_HASH, DOMAINS, check_namespace, dds_type, full_name, is_name
 from lira.hal.rmw.qos import RosQos
-from lira.hal.rmw.services import Answer
+from lira.hal.rmw.services import TRIGGER, Answer
 from lira.hal.rmw.tokens import Endpoint, Kind, Node
 from lira.hal.ros_graph.service import RosService
 from lira.hal.ros_graph.session import open_ros_session
@@ -102,15 +102,15 @@ class RosNode:
         self._declare(lambda node: endpoint(node).token)
         return publisher
 
-    def service(self, name: str, ros_type: str, answer: Callable[[bool | None], Answer]) -> RosService:
-        """Offer a service of std_srvs; `answer` is called by `serve` with a `SetBool`'s data, None for a `Trigger`."""
+    def service(self, name: str, answer: Callable[[], Answer]) -> RosService:
+        """Offer a service, a `Trigger`; `answer` is called by its `serve`."""
         name, number = self.full_name(name), next(self._numbers)
 
         def endpoint(node: Node) -> Endpoint:
-            return Endpoint(node, number, Kind.SERVICE, name, ros_type, self._hash(ros_type), SERVICE_QOS)
+            return Endpoint(node, number, Kind.SERVICE, name, TRIGGER, self._hash(TRIGGER), SERVICE_QOS)
 
         key = endpoint(self._node(self._connection.session)).key
-        service = RosService(self._connection, key, ros_type, answer, self.boundary)
+        service = RosService(self._connection, key, answer, self.boundary)
         self._declare(lambda node: endpoint(node).token)
         return service
 
@@ -126,15 +126,6 @@ class RosNode:
     def links(self) -> int:
         """How many links are up."""
         return len(self._connection.session.info.links())
-
-    def short_peers(self) -> int:
-        """How many peers have no link for datagrams: all, since nobody in such a graph has one."""
-        return self.peers()
-
-    @property
-    def trouble(self) -> str:
-        """Why nobody can connect, "" if they can."""
-        return self._connection.trouble
 
     def close(self, timeout_s: float = CLOSE_S) -> bool:
         """Leave the graph; False if a dead link kept it from closing in time. May be called twice."""

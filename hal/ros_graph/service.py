@@ -1,4 +1,4 @@
-"""A service of std_srvs in a graph of rmw_zenoh: a query, answered with the number and the id that came with it."""
+"""A service (`Trigger`) in a graph of rmw_zenoh: a query, answered with the number and the id that came with it."""
 
 import time
 from collections.abc import Callable
@@ -13,7 +13,7 @@ from lira.hal.bus.connection import Connection
 from lira.hal.bus.reader import take
 from lira.hal.bus.topics import QUESTION_BYTES
 from lira.hal.rmw.attachment import GID_BYTES, RmwAttachment, parse_rmw_attachment
-from lira.hal.rmw.services import Answer, decode_request, encode_answer
+from lira.hal.rmw.services import Answer, encode_answer
 
 ASKED = 16  # requests that wait at most; the oldest makes room
 
@@ -21,17 +21,9 @@ ASKED = 16  # requests that wait at most; the oldest makes room
 class RosService:
     """One. Nothing is done with a request before `serve`."""
 
-    def __init__(
-        self,
-        connection: Connection,
-        key: str,
-        ros_type: str,
-        answer: Callable[[bool | None], Answer],
-        boundary: Boundary,
-    ) -> None:
+    def __init__(self, connection: Connection, key: str, answer: Callable[[], Answer], boundary: Boundary) -> None:
         self._connection = connection
         self._key = key
-        self._ros_type = ros_type
         self._answer = answer
         self._boundary = boundary
         self._queryable = connection.declare(partial(_declare, key))
@@ -50,8 +42,7 @@ class RosService:
         if payload is not None and len(payload) > QUESTION_BYTES:
             self._boundary.refuse(self._key, "too long")
             return
-        asked = decode_request(self._ros_type, b"" if payload is None else bytes(payload))
-        answer = encode_answer(self._ros_type, self._answer(asked))
+        answer = encode_answer(self._answer())
         request = parse_rmw_attachment(None if attached is None else bytes(attached))
         number, gid = (0, bytes(GID_BYTES)) if request is None else (request.number, request.gid)
         query.reply(self._key, answer, attachment=RmwAttachment(number, time.time_ns(), gid).to_bytes())

@@ -1,5 +1,7 @@
 """A robot of ours offered to a graph of rmw_zenoh: seen, heard and driven there, and judged as on the bus."""
 
+import random
+import re
 import struct
 import threading
 import time
@@ -7,6 +9,7 @@ from contextlib import contextmanager
 
 import pytest
 import zenoh
+from trigger import REQUEST, read_answer
 from wiring import joined, new_endpoint, real_time_null, served, wait_for
 from zenoh import ext
 
@@ -18,7 +21,7 @@ from lira.hal.messages.motion import TwistStamped
 from lira.hal.rmw.attachment import RmwAttachment
 from lira.hal.rmw.hashes import type_hash
 from lira.hal.rmw.names import RmwKey
-from lira.hal.rmw.services import TRIGGER, Answer, decode_answer, encode_request
+from lira.hal.rmw.services import TRIGGER
 from lira.hal.rmw.tokens import Kind
 from lira.hal.ros_graph.look import look
 from lira.hal.ros_graph.node import RosNode
@@ -220,6 +223,36 @@ def test_what_has_no_attachment_or_is_garbage_drives_nothing_and_harms_nobody(ca
         assert "no sender" in capsys.readouterr().err
 
 
+def test_no_noise_on_any_of_its_keys_ends_it_or_sets_anything_off():
+    with offered() as there:
+        publisher = RosPublisher(there.session)
+        there.get_going(publisher)
+        noise = random.Random(7)
+        keys = [each.key for each in look(there.graph_at).endpoints]
+        for _ in range(400):
+            payload, beside = (noise.randbytes(noise.choice((0, 4, 33, 60, 300))) for _ in range(2))
+            if noise.random() < 0.5:
+                beside = RmwAttachment(noise.getrandbits(62), noise.getrandbits(62), noise.randbytes(16)).to_bytes()
+            there.session.put(noise.choice(keys), payload, attachment=beside)
+            there.session.get(noise.choice(keys), payload=payload, attachment=beside, timeout=0.1)
+        assert there.robot.failure is None
+        ask(there, "estop/release")  # noise may well have pressed it
+        there.get_going(publisher)
+
+
+def test_every_token_of_it_is_whole_for_a_strict_reader():
+    with offered() as there:
+        tokens = [str(reply.ok.key_expr).split("/") for reply in there.session.liveliness().get("@ros2_lv/**")]
+        assert len(tokens) >= 20
+        for parts in tokens:
+            assert len(parts) == (9 if parts[5] == "NN" else 13)
+            assert all(parts)
+            assert all(part.isascii() for part in parts)
+            if parts[5] != "NN":
+                assert re.fullmatch(r"RIHS01_[0-9a-f]{64}", parts[11])
+                assert re.fullmatch(r"[0-9]*:[0-9]*:[0-9]*,[0-9]*:,:,:,,", parts[12])
+
+
 def test_a_hand_in_the_graph_goes_before_policy_and_gives_back():
     with offered() as there:
         policy = RosPublisher(there.session)
@@ -245,23 +278,23 @@ def ask(there, service):
     handler = there.session.get(
         key(service, TRIGGER),
         zenoh.handlers.FifoChannel(4),
-        payload=encode_request(TRIGGER),
+        payload=REQUEST,
         attachment=RmwAttachment(1, time.time_ns(), bytes(range(16))).to_bytes(),
         target=zenoh.QueryTarget.ALL_COMPLETE,
         timeout=5.0,
     )
     (reply,) = list(handler)
-    return decode_answer(TRIGGER, bytes(reply.ok.payload))
+    return read_answer(bytes(reply.ok.payload))
 
 
 def test_the_emergency_stop_is_pressed_and_released_by_services_and_pressed_by_the_topic():
     with offered() as there:
         publisher = RosPublisher(there.session)
         there.get_going(publisher)
-        assert ask(there, "estop/press") == Answer(True, "emergency")
+        assert ask(there, "estop/press") == (True, "emergency")
         there.drive(publisher, GO, lambda applied: applied.reason is Reason.ESTOP)
-        assert ask(there, "estop/look") == Answer(True, "emergency")
-        assert ask(there, "estop/release").success
+        assert ask(there, "estop/look") == (True, "emergency")
+        assert ask(there, "estop/release")[0]
         there.get_going(publisher)
         data = b"\0\1\0\0\1"
         there.session.put(key("estop", "std_msgs/msg/Bool"), data, attachment=RmwAttachment(1, 0, bytes(16)).to_bytes())
@@ -272,7 +305,7 @@ def test_a_twin_starts_afresh_by_a_service():
     with offered() as there:
         resets = []
         there.robot.inner.reset = resets.append
-        assert ask(there, "sim/reset").success
+        assert ask(there, "sim/reset")[0]
         assert resets
 
 

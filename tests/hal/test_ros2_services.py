@@ -5,13 +5,11 @@ import time
 
 import pytest
 import zenoh
+from trigger import REQUEST, read_answer
 from wiring import joined, real_time_null, served
 
 from lira.hal.bus.services import look_at_estop
 from lira.hal.bus.topics import INFO
-from lira.hal.rmw.services import TRIGGER, decode_answer
-
-REQUEST = b"\x00\x01\x00\x00\x00"  # CDR of a request without fields, as rosidl fills it
 
 
 @pytest.fixture
@@ -44,7 +42,7 @@ def ask(session, key, payload=REQUEST):
 def trigger(session, key):
     ((told, payload),) = ask(session, key)
     assert told == key
-    return decode_answer(TRIGGER, payload)
+    return read_answer(payload)
 
 
 def test_a_ros2_service_presses_and_releases_the_emergency_stop(robot, guest):

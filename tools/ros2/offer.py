@@ -26,6 +26,7 @@ from lira.tools.ros2.telemetry import Telemetry, said_by
 RELAY_S = 0.005
 TELEMETRY_TURNS, LOOK_TURNS = 2, 100  # how many turns what is heard may wait, and whoever begins to listen
 LOST_S = 1.0  # a robot that was not heard for so long may have another clock
+JOIN_S = 3.0  # a service may be waiting for the robot
 FIND_S = 60.0  # a robot opens its devices first
 
 
@@ -51,6 +52,7 @@ class Offer:
         services.start()
         for turn in itertools.count():
             if stop.wait(RELAY_S):
+                services.join(JOIN_S)
                 return
             self._listen()
             self._commands.relay()

@@ -1,5 +1,6 @@
 """The services of a robot in a ROS graph, each a std_srvs/Trigger: its emergency stop, and a twin's fresh start."""
 
+import contextlib
 import threading
 from collections.abc import Callable
 
@@ -10,7 +11,7 @@ from lira.hal.bus.services import EstopState, look_at_estop, press_estop, releas
 from lira.hal.bus.topics import ESTOP_LOOK, ESTOP_PRESS, ESTOP_RELEASE, RESET
 from lira.hal.errors import BusError
 from lira.hal.messages import Episode
-from lira.hal.rmw.services import TRIGGER, Answer
+from lira.hal.rmw.services import Answer
 from lira.hal.ros_graph.node import RosNode
 
 LOOK_S = 0.02
@@ -28,17 +29,18 @@ class Services:
         }
         if arena:
             asked[RESET] = lambda: bus.ask(RESET, msgspec.json.encode(Episode()), timeout_s=RESET_S).decode()
-        self._services = [node.service(key, TRIGGER, _answering(ask)) for key, ask in asked.items()]
+        self._services = [node.service(key, _answering(ask)) for key, ask in asked.items()]
 
     def run(self, stop: threading.Event) -> None:
-        """Answer until `stop` is set."""
-        while not stop.wait(LOOK_S):
-            for service in self._services:
-                service.serve()
+        """Answer until `stop` is set, or the session is closed."""
+        with contextlib.suppress(BusError):
+            while not stop.wait(LOOK_S):
+                for service in self._services:
+                    service.serve()
 
 
-def _answering(ask: Callable[[], str]) -> Callable[[bool | None], Answer]:
-    def answer(_: bool | None) -> Answer:
+def _answering(ask: Callable[[], str]) -> Callable[[], Answer]:
+    def answer() -> Answer:
         try:
             return Answer(True, ask())
         except BusError as error:

@@ -54,10 +54,11 @@ class Telemetry:
     def look(self) -> None:
         """Fetch what somebody in the graph listens to, and what late subscribers get, and nothing else."""
         for key, topic in self._topics.items():
-            if not (topic.qos.latched or self._publishers[key].matching):
-                self._readers.pop(key, None)  # its subscription goes with it
-            elif key not in self._readers:
-                self._readers[key] = self._bus.reader(topic, 1 if topic.qos == PICTURE else NEWEST)
+            with self._boundary.guard(key):  # a session that is just being replaced cannot tell
+                if not (topic.qos.latched or self._publishers[key].matching):
+                    self._readers.pop(key, None)  # its subscription goes with it
+                elif key not in self._readers:
+                    self._readers[key] = self._bus.reader(topic, 1 if topic.qos == PICTURE else NEWEST)
 
     def relay(self) -> None:
         """Pass on what came."""
