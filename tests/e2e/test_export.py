@@ -66,7 +66,7 @@ def test_what_the_learner_saw_is_in_the_data_set(run):
     labels = {(each.observation, each.source, each.novice): each for each in read_demonstrations(found.labels)}
     assert len(labels) > 20
     met = 0
-    pictures = found.pictures.of(step for table in found.tables for step in table.episode.steps)
+    pictures = found.cameras["camera"].of(step for table in found.tables for step in table.episode.steps)
     for table in found.tables:
         for number, step in enumerate(table.episode.steps):
             picture = next(pictures)

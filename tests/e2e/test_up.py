@@ -14,7 +14,7 @@ from lira.hal.bus.bus import Bus
 from lira.hal.bus.topics import APPLIED, OPERATOR
 from lira.hal.messages import STOP, OperatorRequest, Request
 from lira.hal.messages.codec import encode
-from lira.tools.launch.processes import free_port, lira_command
+from lira.tools.launch.processes import ChildProcess, free_port, lira_command
 
 TIMEOUT_S = 60.0
 WATCH_S = 1.5  # longer than it takes from a command to a motion
@@ -135,4 +135,54 @@ def test_what_is_killed_comes_back_and_nothing_drives_until_a_person_says_so(wor
         life.close()
     assert f"'{name}' is down" in lira("down", "--name", name)
     assert not any(map(is_running, pids))
+    assert "nothing is up" in lira("status", "--name", name, ok=(1,))
+
+
+@pytest.fixture
+def robot(tmp_path, monkeypatch):
+    """A robot that somebody else runs: its name, and where it listens."""
+    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path / "state"))
+    monkeypatch.chdir(tmp_path)
+    name, endpoint = f"up_{uuid.uuid4().hex[:8]}", f"127.0.0.1:{free_port()}"
+    command = lira_command("twin", "--name", name, "--listen", endpoint)
+    with ChildProcess("the robot", command, tmp_path / "robot.log") as child:
+        child.wait_ready("serves", TIMEOUT_S)
+        yield name, endpoint
+
+
+def test_beside_a_robot_that_is_there_no_twin_is_started_and_the_robot_stays(robot):
+    name, endpoint = robot
+    words = ["--name", name, "--set", "look", "--without", "page", "--without", "pad"]
+    assert f"up: robot at {endpoint}" in lira("up", "--robot", endpoint, *words)
+    try:
+        status = json.loads(lira("status", "--name", name, "--json", ok=(0, 1)))
+        assert [process["name"] for process in status["processes"]] == ["monitor"]
+    finally:
+        lira("down", "--name", name)
+    lira("up", "--robot", endpoint, *words)  # it answers still
+    lira("down", "--name", name)
+
+
+def test_who_stays_takes_it_down_at_the_end(tmp_path, monkeypatch):
+    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path / "state"))
+    name = f"up_{uuid.uuid4().hex[:8]}"
+    words = ["--name", name, "--listen", f"127.0.0.1:{free_port()}", "--set", "look", "--without", "page"]
+    command = lira_command("up", *words, "--without", "pad", "--stay")
+    with ChildProcess("up", command, tmp_path / "up.log") as child:
+        child.wait_ready("monitor: monitor hears", TIMEOUT_S)
+        assert "twin: twin" in child.output()
+        child.signal(signal.SIGTERM)
+        assert child.wait(TIMEOUT_S) == 0
+        assert child.output().splitlines()[-2:] == ["monitor stopped", "twin stopped"]
+    assert "nothing is up" in lira("status", "--name", name, ok=(1,))
+
+
+def test_a_robot_that_is_not_there_is_said_and_nothing_stays_up(tmp_path, monkeypatch):
+    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path / "state"))
+    name = f"up_{uuid.uuid4().hex[:8]}"
+    words = ["up", "--name", name, "--robot", f"127.0.0.1:{free_port()}", "--set", "look", "--without", "pad"]
+    done = subprocess.run(lira_command(*words), check=False, capture_output=True, text=True, timeout=2 * TIMEOUT_S)
+    assert done.returncode == 2
+    assert "before it was ready" in done.stderr
+    assert f"no robot named '{name}' answers" in done.stderr
     assert "nothing is up" in lira("status", "--name", name, ok=(1,))

@@ -24,7 +24,7 @@ from lira.hal.messages import (
     Twist,
 )
 from lira.hal.profile import load_profile
-from lira.tools.export.pictures import Pictures
+from lira.tools.export.pictures import color_pictures
 
 PROFILE = load_profile("thesis-sim")
 PERIOD_S = PROFILE.period_s
@@ -96,7 +96,13 @@ def recording():
 def pictures(messages=None):
     """The pictures of a recording, as often as they are asked for."""
     found = [each.message for each in (recording() if messages is None else messages) if each.key == CAMERA.key]
-    return Pictures(lambda: iter(found))
+    return color_pictures(lambda: iter(found))
+
+
+def cameras(messages=None):
+    """What has pictures."""
+    found = pictures(messages)
+    return {} if found.size is None else {"camera": found}
 
 
 def label(number, driver, *, stored):

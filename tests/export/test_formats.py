@@ -9,17 +9,18 @@ import h5py
 import numpy as np
 import pyarrow.parquet as pq
 import pytest
-from heard import DRIVERS, HEIGHT, LENGTHS, PROFILE, WIDTH, level, pictures, recording
+from heard import DRIVERS, HEIGHT, LENGTHS, PROFILE, WIDTH, cameras, level, recording
 
 from lira.hal.errors import StorageError
 from lira.tools.export.columns import tables_of
 from lira.tools.export.csv_file import write_csv
-from lira.tools.export.lerobot import CAMERA, write_lerobot
+from lira.tools.export.lerobot import PICTURES, write_lerobot
 from lira.tools.export.robomimic import write_robomimic
 from lira.tools.export.statistics import merged, statistics_of
 from lira.tools.export.steps import episodes_of, steps_of
 
 COUNT, FPS = sum(LENGTHS), 5
+CAMERA = f"{PICTURES}camera"
 
 
 def tables(messages=None):
@@ -30,7 +31,7 @@ def tables(messages=None):
 def lerobot(tmp_path_factory):
     """A folder as LeRobot has it."""
     folder = tmp_path_factory.mktemp("lerobot") / "run"
-    write_lerobot(tables(), pictures(), folder, robot="thesis-sim", task="follow the line", fps=FPS)
+    write_lerobot(tables(), cameras(), folder, robot="thesis-sim", task="follow the line", fps=FPS)
     return folder
 
 
@@ -136,13 +137,13 @@ def test_lerobot_reads_it_itself(lerobot):
 
 def test_a_run_without_a_camera_has_no_video(tmp_path):
     messages = [each for each in recording() if "camera" not in each.key]
-    write_lerobot(tables(messages), pictures(messages), tmp_path / "run", robot="r", task="t", fps=FPS)
+    write_lerobot(tables(messages), cameras(messages), tmp_path / "run", robot="r", task="t", fps=FPS)
     assert info_of(tmp_path / "run")["video_path"] is None
     assert not (tmp_path / "run/videos").exists()
 
 
 def test_robomimic_has_a_group_for_each_episode(tmp_path):
-    write_robomimic(tables(), pictures(), tmp_path / "run.hdf5", {"robot": "thesis-sim", "world": "line"})
+    write_robomimic(tables(), cameras(), tmp_path / "run.hdf5", {"robot": "thesis-sim", "world": "line"})
     with h5py.File(tmp_path / "run.hdf5") as file:
         assert file["data"].attrs["total"] == COUNT
         assert json.loads(file["data"].attrs["env_args"])["env_name"] == "line"
@@ -161,11 +162,21 @@ def test_robomimic_has_a_group_for_each_episode(tmp_path):
         assert [name.decode() for name in file["mask/prove"][:]] == ["demo_1"]
 
 
+def test_a_lap_of_one_step_is_a_lap(tmp_path):
+    messages = list(recording())[:7]  # up to the first decision and what came of it
+    write_robomimic(tables(messages), cameras(messages), tmp_path / "run.hdf5", {})
+    with h5py.File(tmp_path / "run.hdf5") as file:
+        assert file["data/demo_0/next_obs/image"].shape == (1, HEIGHT, WIDTH, 3)
+        assert (file["data/demo_0/next_obs/scan"][:] == file["data/demo_0/obs/scan"][:]).all()
+    write_lerobot(tables(messages), cameras(messages), tmp_path / "run", robot="r", task="t", fps=FPS)
+    assert info_of(tmp_path / "run")["total_frames"] == 1
+
+
 def test_robomimic_reads_it_itself(tmp_path):
     sets = pytest.importorskip("robomimic.utils.dataset", reason="no client of others is installed")
     from robomimic.utils.obs_utils import initialize_obs_utils_with_obs_specs
 
-    write_robomimic(tables(), pictures(), tmp_path / "run.hdf5", {"world": "line"})
+    write_robomimic(tables(), cameras(), tmp_path / "run.hdf5", {"world": "line"})
     initialize_obs_utils_with_obs_specs({"obs": {"low_dim": ["state", "scan"], "rgb": ["image"]}})
     keys = {"obs_keys": ("state", "scan", "image"), "dataset_keys": ("actions", "intervention")}
     data = sets.SequenceDataset(
@@ -196,7 +207,7 @@ def test_csv_has_a_line_for_each_step(tmp_path):
     assert len(rows[0]) < 40
 
 
-@pytest.mark.parametrize("write", [write_csv, lambda t, p: write_robomimic(t, pictures(), p, {})])
+@pytest.mark.parametrize("write", [write_csv, lambda t, p: write_robomimic(t, cameras(), p, {})])
 def test_nothing_is_written_over(tmp_path, write):
     (tmp_path / "there").write_text("mine")
     with pytest.raises(StorageError, match="cannot write"):
@@ -206,4 +217,4 @@ def test_nothing_is_written_over(tmp_path, write):
 
 def test_no_data_set_is_written_over(lerobot):
     with pytest.raises(StorageError, match="cannot write"):
-        write_lerobot(tables(), pictures(), lerobot, robot="r", task="t", fps=FPS)
+        write_lerobot(tables(), cameras(), lerobot, robot="r", task="t", fps=FPS)

@@ -3,29 +3,48 @@
 import json
 from dataclasses import replace
 
+import h5py
 import numpy as np
 import pyarrow.parquet as pq
 import pytest
-from heard import LENGTHS, PERIOD_S, PROFILE, picture, pictures, recording, scan, stamp
+from heard import LENGTHS, PERIOD_S, PROFILE, Message, cameras, picture, recording, scan, stamp
 from rosbags.rosbag1 import Writer as Writer1
 from rosbags.rosbag2 import StoragePlugin, Writer
 from rosbags.typesys import Stores, get_typestore
 
 from lira.fusion.log.label_log import read_demonstrations
+from lira.fusion.modalities.depth import near_depth
 from lira.fusion.preprocess import Features, Preprocessor
+from lira.hal.bus.topics import DEPTH
 from lira.hal.errors import ConfigError, StorageError
-from lira.hal.messages import Applied, CompressedImage, LaserScan, Observation, Reason, Source, Twist, TwistStamped
+from lira.hal.messages import (
+    Applied,
+    CompressedImage,
+    DepthImage,
+    LaserScan,
+    Observation,
+    Reason,
+    Source,
+    Twist,
+    TwistStamped,
+)
 from lira.hal.messages.codec import encode, ros_type_of
+from lira.hal.messages.compression import compress_depth
 from lira.hal.messages.ros_table import CODECS, TYPES
+from lira.hal.profile import load_profile
 from lira.tools.cli import main
 from lira.tools.export.bag_reader import choose, read_bag
 from lira.tools.export.columns import SCAN, tables_of
 from lira.tools.export.demonstrations import Shown, keep
-from lira.tools.export.lerobot import CAMERA, write_lerobot
+from lira.tools.export.lerobot import PICTURES, write_lerobot
 from lira.tools.export.lerobot_reader import features_for, read_info, read_lerobot
+from lira.tools.export.pictures import depth_pictures
+from lira.tools.export.robomimic import write_robomimic
 from lira.tools.export.steps import episodes_of, steps_of
 
 BASE = PROFILE.base
+CAMERA = f"{PICTURES}camera"
+VIDEO = {"dtype": "video", "shape": [8, 8, 3]}
 SCAN_TYPE, PICTURE_TYPE, TWIST_TYPE = (ros_type_of(kind) for kind in (LaserScan, CompressedImage, Twist))
 
 
@@ -38,7 +57,7 @@ def features(number):
 def data_set(tmp_path_factory):
     folder = tmp_path_factory.mktemp("set") / "run"
     tables = tables_of(list(episodes_of(steps_of(recording()))), PROFILE)
-    write_lerobot(tables, pictures(), folder, robot="thesis-sim", task="t", fps=5)
+    write_lerobot(tables, cameras(), folder, robot="thesis-sim", task="t", fps=5)
     return folder
 
 
@@ -70,7 +89,8 @@ def test_import_makes_labels_that_a_run_begins_with(data_set, tmp_path, capsys):
 def info_with(data_set, tmp_path, **changes):
     """The data set's description with other features."""
     words = json.loads((data_set / "meta/info.json").read_text())
-    words["features"] |= changes.pop("features", {})
+    features = words["features"] | changes.pop("features", {})
+    words["features"] = {name: each for name, each in features.items() if each is not None}
     (tmp_path / "meta").mkdir()
     (tmp_path / "meta/info.json").write_text(json.dumps(words | changes))
     return tmp_path
@@ -86,7 +106,7 @@ def test_a_data_set_of_another_version_is_told(data_set, tmp_path):
     [
         ({"action": {"dtype": "float32", "shape": [6]}}, "two numbers"),
         ({SCAN: {"dtype": "float32", "shape": [7]}}, "the scan of 'thesis-sim' is"),
-        ({"observation.images.wrist": {"dtype": "video", "shape": [8, 8, 3]}}, "not clear which feature"),
+        ({CAMERA: None, "images.front": VIDEO, "images.wrist": VIDEO}, "not clear which feature"),
     ],
 )
 def test_features_that_do_not_fit_are_told(data_set, tmp_path, feature, words):
@@ -95,9 +115,34 @@ def test_features_that_do_not_fit_are_told(data_set, tmp_path, feature, words):
 
 
 def test_a_feature_of_another_name_is_named(data_set, tmp_path):
-    wrist = {"observation.images.wrist": {"dtype": "video", "shape": [8, 8, 3]}}
-    info = read_info(info_with(data_set, tmp_path, features=wrist))
-    assert features_for(info, PROFILE, {"image": CAMERA}) == {"image": CAMERA, "scan": SCAN}
+    info = read_info(info_with(data_set, tmp_path, features={"images.front": VIDEO}))
+    assert features_for(info, PROFILE, {}) == {"image": CAMERA, "scan": SCAN}  # the usual one
+    assert features_for(info, PROFILE, {"image": "images.front"})["image"] == "images.front"
+
+
+def test_the_only_camera_of_a_data_set_is_the_robots(data_set, tmp_path):
+    info = read_info(info_with(data_set, tmp_path, features={CAMERA: None, "images.front": VIDEO}))
+    assert features_for(info, PROFILE, {})["image"] == "images.front"
+
+
+def test_depth_goes_out_and_comes_back(tmp_path):
+    """Of a robot that learns from it."""
+    profile = load_profile("thesis-sim-depth")
+    columns = np.linspace(500, 4000, 40, dtype=np.uint16)
+    depths = [DepthImage(stamp(number), np.tile(columns + 100 * number, (30, 1))) for number in range(sum(LENGTHS))]
+    kept = [compress_depth(each) for each in depths]
+    heard = [Message(DEPTH.key, each) for each in kept] + list(recording())
+    tables = tables_of(list(episodes_of(steps_of(heard))), profile)
+    assert tables[0]["complete"].values.all()
+    seen = {**cameras(), "depth": depth_pictures(lambda: iter(kept), profile)}
+    write_lerobot(tables, seen, tmp_path / "set", robot=profile.name, task="t", fps=5)
+    shape = profile.features
+    for shown, depth in zip(read_lerobot(tmp_path / "set", profile, "all"), depths, strict=True):
+        near = near_depth(depth, shape.image_px, shape.max_depth_m or shape.max_range_m)
+        assert np.abs(shown.features.depth - near).max() < 0.05
+    write_robomimic(tables, seen, tmp_path / "run.hdf5", {})
+    with h5py.File(tmp_path / "run.hdf5") as file:
+        assert file["data/demo_1/obs/depth"].shape == (LENGTHS[1], shape.image_px, shape.image_px, 3)
 
 
 def test_a_data_set_that_was_damaged_is_told(data_set, tmp_path):
@@ -129,13 +174,16 @@ def test_what_a_robot_cannot_do_is_cut_and_counted(tmp_path):
     assert [label.action for label in read_demonstrations(tmp_path / "labels.lira")] == [(1.0, 0.1), (0.5, 0.1)]
     with pytest.raises(StorageError, match="nothing to learn from"):
         keep([], tmp_path / "others.lira", PROFILE)
+    assert not (tmp_path / "others.lira").exists()
 
 
 def test_what_cannot_be_a_label_is_told_or_left_out(tmp_path):
     nothing = Shown(1.0, 0, features(0), (float("nan"), 0.1))
-    tally = keep([nothing, Shown(2.0, 0, features(1), (0.5, 0.1), "o" * 99)], tmp_path / "labels.lira", PROFILE)
-    assert (tally.taken, tally.without) == (1, 1)
-    assert [label.source for label in read_demonstrations(tmp_path / "labels.lira")] == ["human"]
+    others = [Shown(2.0, 0, features(1), (0.5, 0.1), name) for name in ("lab/wall:go", "o" * 99, " ", "a\n")]
+    tally = keep([nothing, *others], tmp_path / "labels.lira", PROFILE)
+    assert (tally.taken, tally.without) == (4, 1)
+    names = [label.source for label in read_demonstrations(tmp_path / "labels.lira")]
+    assert names == ["lab/wall:go", "human", "human", "human"]
     metres = Features(image=features(0).image, scan=features(0).scan * 4)
     with pytest.raises(StorageError, match="not within 0 and 1"):
         keep([Shown(1.0, 0, metres, (0.5, 0.1))], tmp_path / "labels.lira", PROFILE)

@@ -12,7 +12,7 @@ from lira.hal.messages import CompressedImage
 from lira.tools.export.buffer import in_buffer
 from lira.tools.export.columns import SCAN as SCAN_COLUMN
 from lira.tools.export.columns import tables_of
-from lira.tools.export.pictures import Pictures
+from lira.tools.export.pictures import color_pictures
 from lira.tools.export.steps import episodes_of, steps_of
 
 
@@ -129,12 +129,12 @@ def test_pictures_of_another_size_are_resized():
     small = cv2.imencode(".png", np.full((24, 32, 3), 77, np.uint8))[1].tobytes()
     found = [each.message for each in recording() if each.key == CAMERA.key]
     found[1] = CompressedImage(stamp(1), small, "png")
-    shown = list(Pictures(lambda: iter(found)).of(steps()[:2]))
+    shown = list(color_pictures(lambda: iter(found)).of(steps()[:2]))
     assert shown[1].shape == (HEIGHT, WIDTH, 3)
     assert int(shown[1][0, 0, 0]) == 77
 
 
 def test_pictures_that_no_step_shows_are_passed_over():
     found = [each.message for each in recording() if each.key == CAMERA.key]
-    shown = list(Pictures(lambda: iter(found)).of(steps()[3::3]))
+    shown = list(color_pictures(lambda: iter(found)).of(steps()[3::3]))
     assert [int(each[0, -1, 0]) for each in shown] == [level(3), level(6)]

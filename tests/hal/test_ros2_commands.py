@@ -80,6 +80,15 @@ def test_a_stamp_of_zero_is_none_and_counts_by_its_arrival(scene):
     repeat(ros, lambda: twist_stamped(0.0, GO), lambda: robot.inner.state().linear_m_s == 0.3)
 
 
+def test_nav2_behind_a_mux_that_says_zeros_drives_and_a_silent_nav2_stands(scene):
+    """As docs/howto/nav2.md has it: zeros without a stamp while nav2 has no goal, then its own, from one publisher."""
+    robot, _, ros = scene
+    repeat(ros, lambda: twist_stamped(0.0, STOP, b""), lambda: robot.governed.state == "armed")
+    repeat(ros, lambda: twist_stamped(time.time() - 0.01, GO), lambda: robot.inner.state().linear_m_s == 0.3, 1.0)
+    repeat(ros, lambda: twist_stamped(0.0, STOP, b""), lambda: robot.inner.state().linear_m_s == 0.0, 0.5)
+    repeat(ros, lambda: twist_stamped(time.time() - 0.01, GO), lambda: robot.inner.state().linear_m_s == 0.3, 1.0)
+
+
 @pytest.mark.parametrize(("lag_s", "refused", "way"), [(3.0, "late", "behind"), (-3.0, "from the future", "ahead of")])
 def test_ros2_commands_with_the_stamps_of_another_clock_drive_nothing_and_that_is_told(scene, lag_s, refused, way):
     robot, bus, ros = scene

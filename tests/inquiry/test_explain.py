@@ -108,4 +108,4 @@ def test_a_robot_that_never_stopped_and_nobody_who_was_called_are_said(plus, tmp
 
 def test_now_has_no_times(capsys):
     assert main(["explain", "--last-stop"]) == 2
-    assert "a time is one of a recording" in capsys.readouterr().err
+    assert "times and labels are those of a recording" in capsys.readouterr().err

@@ -8,7 +8,7 @@ import pytest
 from samples import HEAD, drive, odom, picture
 
 from lira.hal.bus.topics import CAMERA, ODOM
-from lira.hal.errors import StorageError
+from lira.hal.errors import LiraError, StorageError
 from lira.tools.recording import recorder as module
 from lira.tools.recording.reader import Recording
 from lira.tools.recording.recorder import Recorder
@@ -113,3 +113,13 @@ def test_an_attachment_that_is_out_of_bounds_is_recorded_and_not_believed(tmp_pa
     assert module.attachment_of(bad) is None
     record(tmp_path / "rec", ATap([bad]))
     assert [each.beside for each in Recording(tmp_path / "rec").messages()][-1] == bad.attachment
+
+
+@pytest.mark.filterwarnings("ignore::pytest.PytestUnhandledThreadExceptionWarning")
+def test_a_fault_of_the_recorders_own_is_no_recording(tmp_path):
+    class Faulty(RecordingWriter):
+        def add(self, *arguments):
+            raise RuntimeError("nobody foresaw it")
+
+    with pytest.raises(LiraError, match="the recorder failed"):
+        record(tmp_path / "rec", ATap([odom(1, 5.0)]), writer=Faulty)

@@ -3,6 +3,7 @@
 import argparse
 import json
 import os
+import socket
 import subprocess
 import sys
 import time
@@ -11,16 +12,18 @@ import msgspec
 import pytest
 
 from lira.hal.bus.sensors import SENSORS
-from lira.hal.errors import ConfigError
+from lira.hal.errors import ConfigError, MissingExtraError
 from lira.hal.profile import load_profile
 from lira.tools.cli import EXTRAS, Parser, main
+from lira.tools.launch.processes import free_port
 from lira.tools.lifecycle import folder as folders
 from lira.tools.lifecycle import services
-from lira.tools.lifecycle.arguments import Ports, add_setup, setup_of
+from lira.tools.lifecycle.arguments import Ports, add_setup, check_method, check_packages, setup_of
 from lira.tools.lifecycle.folder import AlreadyUpError, StateFolder
 from lira.tools.lifecycle.line import WINDOW_S, Rate
 from lira.tools.lifecycle.logs import Follower, last_lines
 from lira.tools.lifecycle.monitor import rate_of
+from lira.tools.lifecycle.ports import free_from
 from lira.tools.lifecycle.records import HEARD, STATE, Heard, ProcessState, State, TopicState
 from lira.tools.lifecycle.restart import CALM_S, LONGEST_S, READY_S, Phase, Restarts, pause_s
 from lira.tools.lifecycle.setup import Setup, endpoint_of, run_folder
@@ -140,10 +143,24 @@ def test_what_does_not_go_together_is_refused_before_anything_starts(words):
         asked(*words)
 
 
-def test_a_method_by_which_nobody_learns_is_refused(tmp_path, monkeypatch, capsys):
-    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path))
-    assert main(["up", "--method", "thesis-like"]) == 2
-    assert list(tmp_path.iterdir()) == []
+@pytest.mark.parametrize("method", ["nobody-knows-it", "switching"])
+def test_a_method_by_which_nobody_learns_is_refused(method):
+    with pytest.raises(ConfigError):
+        check_method(asked("--method", method))
+
+
+def test_a_package_that_a_process_lacks_is_named_with_its_extra(monkeypatch):
+    monkeypatch.setitem(sys.modules, "segno", None)
+    with pytest.raises(MissingExtraError, match="segno"):
+        check_packages(asked("--set", "look"))
+
+
+def test_a_second_robot_gets_the_next_port_that_nobody_has():
+    port = free_port()
+    with socket.socket() as taken:
+        taken.bind(("127.0.0.1", port))
+        taken.listen()
+        assert port < free_from(port) < port + 50
 
 
 # When one is started again

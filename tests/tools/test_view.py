@@ -227,7 +227,12 @@ def test_a_topic_is_fetched_from_the_robot_only_while_somebody_looks():
         second = await late.first_of_each(["/battery"])
         assert first["/battery"].message.voltage == second["/battery"].message.voltage == 12.0
         await client.socket.close()
+        await late.socket.close()
         await asyncio.to_thread(wait_until, lambda: not camera.matching)
+        battery.put(BatteryState(2.0, 11.0), 2.0)  # while nobody looks
+        again = await connect(session, viewer.port)
+        await again.subscribe("/battery")
+        assert (await again.next()).message.voltage == 11.0
 
     try:
         with streaming(LiveSource(watch), viewer):

@@ -74,13 +74,10 @@ def tables_of(episodes: Sequence[ExportEpisode], profile: RobotProfile) -> list[
 
 
 def _columns(steps: Sequence[ExportStep], experts: Sequence[str], profile: RobotProfile) -> tuple[Column, ...]:
-    scans, states, decisions = (
-        [_scan(step, profile) for step in steps],
-        [_state(step) for step in steps],
-        [step.decision for step in steps],
-    )
+    decisions = [step.decision for step in steps]
+    scans, states = [_scan(step, profile) for step in steps], [_state(step) for step in steps]
     bins = profile.features.bins
-    seen = [step.picture is not None for step in steps]
+    seen = [step.picture is not None and (step.depth is not None or profile.depth is None) for step in steps]
     there = [scan is not None and state is not None for scan, state in zip(scans, states, strict=True)]
     return (
         _vector("observation.state", VELOCITY, _filled(states, (0.0, 0.0))),

@@ -3,6 +3,7 @@
 import math
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
+from itertools import chain
 from pathlib import Path
 
 from lira.fusion.log.label_file import LIMIT
@@ -13,7 +14,7 @@ from lira.hal.messages import Action, Driver
 from lira.hal.profile import RobotProfile
 
 NOTHING: Action = (0.0, 0.0)
-MOST_LETTERS = 32  # of a name in the log
+NAME_BYTES = 32  # of a driver in the log
 
 
 @dataclass(frozen=True, slots=True)
@@ -35,20 +36,25 @@ class Tally:
     clipped: int = 0
     without: int = 0
 
+    def is_usable(self, shown: Shown) -> bool:
+        """Whether something was done; counts what was not."""
+        done = all(map(math.isfinite, shown.action))
+        self.without += not done
+        return done
+
 
 def keep(shown: Iterable[Shown], path: Path, profile: RobotProfile, say: Callable[[str], None] = print) -> Tally:
-    """Append to a log of labels, which need not be there yet. Raises `StorageError`, also if there was nothing."""
+    """Append to a log of labels, which need not be there yet. Raises `StorageError`, also if there is nothing."""
     tally = Tally()
+    usable = (each for each in shown if tally.is_usable(each))
+    first = next(usable, None)  # before there is a log: for nothing, none is begun
+    if first is None:
+        raise StorageError("there is nothing to learn from in it", "Is it the right file, and were all sensors there?")
     with DemonstrationLog(path, profile, say=say) as log:
-        for number, each in enumerate(shown):
-            if not all(map(math.isfinite, each.action)):
-                tally.without += 1
-                continue
+        for number, each in enumerate(chain([first], usable)):
             log.append(_label(number, each))
             tally.taken += 1
             tally.clipped += _within(each.action) != each.action
-    if not tally.taken:
-        raise StorageError("there is nothing to learn from in it", "Is it the right file, and were all sensors there?")
     return tally
 
 
@@ -58,17 +64,21 @@ def _label(number: int, shown: Shown) -> Demonstration:
             raise StorageError(
                 f"the {name} of demonstration {number} is not within 0 and 1", "Scale it as networks here see it."
             )
-    source = shown.source if shown.source.isidentifier() and len(shown.source) <= MOST_LETTERS else Driver.HUMAN
     return Demonstration(
         shown.stamp_s,
         number,
         shown.episode,
-        source,
+        shown.source if _is_name(shown.source) else Driver.HUMAN,
         _within(shown.action),
         NOTHING,
         stored=True,
         features=shown.features,
     )
+
+
+def _is_name(source: str) -> bool:
+    """Whether a log takes it as the name of a driver."""
+    return source.isprintable() and source == source.strip() and 0 < len(source.encode()) <= NAME_BYTES
 
 
 def _within(action: Action) -> Action:

@@ -16,11 +16,11 @@ import pyarrow.parquet as pq
 from lira.hal.errors import StorageError
 from lira.tools.export import video
 from lira.tools.export.columns import Column, Kind, Table
-from lira.tools.export.pictures import Pictures, Size
+from lira.tools.export.pictures import Cameras, Pictures, Size
 from lira.tools.export.statistics import PictureSampler, Statistics, merged, statistics_of
 
 VERSION = "v3.0"
-CAMERA = "observation.images.camera"
+PICTURES = "observation.images."  # and the camera's name
 FILE = "chunk-000/file-000"
 FILES = "chunk-{chunk_index:03d}/file-{file_index:03d}"
 MOST_FILES, DATA_MB, VIDEO_MB = 1000, 100, 200  # what others who append keep to
@@ -41,32 +41,29 @@ COUNTED: dict[str, Kind] = {
 }
 
 
-def write_lerobot(
-    tables: Sequence[Table], pictures: Pictures, folder: Path, *, robot: str, task: str, fps: int
-) -> None:
+def write_lerobot(tables: Sequence[Table], cameras: Cameras, folder: Path, *, robot: str, task: str, fps: int) -> None:
     """Write a new folder. Raises `StorageError`."""
-    size = pictures.size
+    sizes = {f"{PICTURES}{name}": pictures.size or (0, 0) for name, pictures in cameras.items()}
     try:
         folder.mkdir(parents=True)
-        seen = [] if size is None else _write_pictures(folder, tables, pictures, size, fps)
+        seen = {f"{PICTURES}{name}": _write_pictures(folder, name, tables, each, fps) for name, each in cameras.items()}
         statistics = _statistics(tables, seen, fps)
         _write_parquet(folder / f"data/{FILE}.parquet", _data(tables, fps))
-        _write_parquet(folder / f"meta/episodes/{FILE}.parquet", _episodes(tables, statistics, size, task, fps))
+        _write_parquet(folder / f"meta/episodes/{FILE}.parquet", _episodes(tables, statistics, list(sizes), task, fps))
         _write_parquet(folder / "meta/tasks.parquet", _tasks(task))
         whole = {name: merged([each[name] for each in statistics]) for name in statistics[0]}
         _write_json(folder / "meta/stats.json", whole)
-        _write_json(folder / "meta/info.json", _info(tables, robot=robot, size=size, fps=fps))
+        _write_json(folder / "meta/info.json", _info(tables, robot=robot, sizes=sizes, fps=fps))
     except OSError as error:
         raise StorageError(f"cannot write {folder}: {error.strerror or error}", "Choose another folder.") from error
 
 
-def _write_pictures(
-    folder: Path, tables: Sequence[Table], pictures: Pictures, size: Size, fps: int
-) -> list[Statistics]:
-    """Write all pictures; returns their statistics by episode. They are told once for both."""
+def _write_pictures(folder: Path, name: str, tables: Sequence[Table], pictures: Pictures, fps: int) -> list[Statistics]:
+    """Write all of a camera's; returns their statistics by episode. They are told once for both."""
     sampler = PictureSampler(list(map(len, tables)))
     all_steps = (step for table in tables for step in table.episode.steps)
-    video.write_video(folder / f"videos/{CAMERA}/{FILE}.mp4", sampler.through(pictures.of(all_steps)), size, fps)
+    path = folder / f"videos/{PICTURES}{name}/{FILE}.mp4"
+    video.write_video(path, sampler.through(pictures.of(all_steps)), pictures.size or (0, 0), fps)
     return sampler.statistics()
 
 
@@ -99,19 +96,19 @@ def _arrow(column: Column) -> pa.Array:
     return pa.FixedSizeListArray.from_arrays(flat, len(column.names))
 
 
-def _statistics(tables: Sequence[Table], seen: Sequence[Statistics], fps: int) -> list[dict[str, Statistics]]:
-    """Return those of each episode by feature; `seen` are its pictures'."""
-    found = [
+def _statistics(
+    tables: Sequence[Table], seen: Mapping[str, Sequence[Statistics]], fps: int
+) -> list[dict[str, Statistics]]:
+    """Return those of each episode by feature; `seen` are those of pictures."""
+    return [
         {column.name: statistics_of(column.values) for column in columns if column.kind != "string"}
-        for _, columns in _with_counts(tables, fps)
+        | {name: each[number] for name, each in seen.items()}
+        for number, (_, columns) in enumerate(_with_counts(tables, fps))
     ]
-    for each, pictures in zip(found, seen, strict=False):
-        each[CAMERA] = pictures
-    return found
 
 
 def _episodes(
-    tables: Sequence[Table], statistics: Sequence[Mapping[str, Statistics]], size: Size | None, task: str, fps: int
+    tables: Sequence[Table], statistics: Sequence[Mapping[str, Statistics]], seen: Sequence[str], task: str, fps: int
 ) -> pa.Table:
     rows, first = [], 0
     for number, (table, found) in enumerate(zip(tables, statistics, strict=True)):
@@ -125,12 +122,12 @@ def _episodes(
             "dataset_from_index": first,
             "dataset_to_index": end,
         }
-        if size is not None:
+        for name in seen:
             row |= {
-                f"videos/{CAMERA}/chunk_index": 0,
-                f"videos/{CAMERA}/file_index": 0,
-                f"videos/{CAMERA}/from_timestamp": first / fps,
-                f"videos/{CAMERA}/to_timestamp": end / fps,
+                f"videos/{name}/chunk_index": 0,
+                f"videos/{name}/file_index": 0,
+                f"videos/{name}/from_timestamp": first / fps,
+                f"videos/{name}/to_timestamp": end / fps,
             }
         row |= {f"stats/{name}/{key}": value for name, each in found.items() for key, value in each.items()}
         rows.append(row | {"meta/episodes/chunk_index": 0, "meta/episodes/file_index": 0})
@@ -153,7 +150,7 @@ def _tasks(task: str) -> pa.Table:
     return table.replace_schema_metadata({"pandas": json.dumps(words)})
 
 
-def _info(tables: Sequence[Table], *, robot: str, size: Size | None, fps: int) -> dict[str, Any]:
+def _info(tables: Sequence[Table], *, robot: str, sizes: Mapping[str, Size], fps: int) -> dict[str, Any]:
     features = {
         column.name: {
             "dtype": column.kind,
@@ -162,8 +159,7 @@ def _info(tables: Sequence[Table], *, robot: str, size: Size | None, fps: int) -
         }
         for column in tables[0].columns
     }
-    if size is not None:
-        features[CAMERA] = _camera(*video.even(size), fps)
+    features |= {name: _camera(*video.even(size), fps) for name, size in sizes.items()}
     features |= {name: {"dtype": kind, "shape": [1], "names": None} for name, kind in COUNTED.items()}
     return {
         "codebase_version": VERSION,
@@ -177,7 +173,7 @@ def _info(tables: Sequence[Table], *, robot: str, size: Size | None, fps: int) -
         "fps": fps,
         "splits": {"train": f"0:{len(tables)}"},
         "data_path": f"data/{FILES}.parquet",
-        "video_path": None if size is None else f"videos/{{video_key}}/{FILES}.mp4",
+        "video_path": f"videos/{{video_key}}/{FILES}.mp4" if sizes else None,
         "features": features,
     }
 

@@ -95,8 +95,9 @@ def features_for(info: Info, profile: RobotProfile, named: Mapping[str, str]) ->
     found = {}
     for row in modalities_of(profile):
         shape = list(row.shape(profile))
-        guess = [SCAN] if row.trunk == "scan" else pictures if row.name == "image" and len(pictures) == 1 else []
-        key = named.get(row.name) or next(iter(guess), "")
+        usual = SCAN if row.trunk == "scan" else f"observation.images.{row.sensor}"
+        only = pictures[0] if row.name == "image" and len(pictures) == 1 else ""
+        key = named.get(row.name) or (usual if usual in info.features else only)
         if key not in info.features:
             what = f"it is not clear which feature of the data set is the robot's {row.name}"
             raise ConfigError(what, f"Say so with --map {row.name}=FEATURE; there are {', '.join(info.features)}.")
@@ -138,8 +139,8 @@ def _pictures(folder: Path, info: Info, episode: Mapping[str, Any], key: str) ->
     """Yield an episode's pictures, RGB, one for each frame."""
     begin_s, end_s = (float(episode[f"videos/{key}/{edge}_timestamp"]) for edge in ("from", "to"))
     where = {name: episode[f"videos/{key}/{name}"] for name in ("chunk_index", "file_index")}
-    assert info.video_path is not None
-    with av.open(str(folder / info.video_path.format(video_key=key, **where))) as file:
+    path = (info.video_path or "").format(video_key=key, **where)
+    with av.open(str(folder / path)) as file:
         stream = file.streams.video[0]
         file.seek(int(Fraction(begin_s) / (stream.time_base or Fraction(1))), stream=stream, backward=True)
         for frame in file.decode(stream):

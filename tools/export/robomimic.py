@@ -1,8 +1,8 @@
 """robomimic: one HDF5 file with a group for each episode, `data/demo_0` and so on.
 
-`obs` holds what a policy sees (`state`, `scan`, `image`), `next_obs` the same a step later, `actions` what was driven,
-in [-1, 1]. All other columns lie beside them under their own names. `mask/train`, `mask/prove` and `mask/unseen` list
-the episodes of a phase.
+`obs` holds what a policy sees (`state`, `scan`, `image`, and `depth` of a robot that has it), `next_obs` the same a
+step later, `actions` what was driven, in [-1, 1]. All other columns lie beside them under their own names.
+`mask/train`, `mask/prove` and `mask/unseen` list the episodes of a phase.
 """
 
 import json
@@ -17,26 +17,27 @@ import numpy as np
 from lira.hal.errors import StorageError
 from lira.hal.messages import ByteArray, Phase
 from lira.tools.export.columns import SCAN, Table
-from lira.tools.export.pictures import Pictures
+from lira.tools.export.pictures import Cameras
 
 GYM = 2  # robomimic's number for environments that are neither of its two simulators
-OBSERVED = {"observation.state": "state", SCAN: "scan"}
+OBSERVED = {"observation.state": "state", SCAN: "scan", "camera": "image", "depth": "depth"}
 
 
-def write_robomimic(tables: Sequence[Table], pictures: Pictures, path: Path, about: Mapping[str, str]) -> None:
+def write_robomimic(tables: Sequence[Table], cameras: Cameras, path: Path, about: Mapping[str, str]) -> None:
     """Write a new file; `about` says of which robot and world. Raises `StorageError`."""
-    passing = pictures.of(step for table in tables for step in table.episode.steps)
+    steps = [step for table in tables for step in table.episode.steps]
+    passing = {name: (pictures.of(steps), pictures.size) for name, pictures in cameras.items()}
     try:
         with h5py.File(path, "x") as file:
             data = file.create_group("data")
-            data.attrs["total"] = sum(map(len, tables))
+            data.attrs["total"] = len(steps)
             env_args = {"env_name": about.get("world", ""), "type": GYM, "env_kwargs": dict(about)}
             data.attrs["env_args"] = json.dumps(env_args)
             for number, table in enumerate(tables):
                 group = data.create_group(f"demo_{number}")
                 _write_columns(group, table)
-                if pictures.size is not None:
-                    _write_pictures(group, passing, (len(table), *pictures.size, 3))
+                for name, (pictures, size) in passing.items():
+                    _write_pictures(group, OBSERVED[name], pictures, (len(table), *(size or (0, 0)), 3))
                 for name in list(group["obs"]):
                     _point_to_next(group, name)
             _write_masks(file, tables)
@@ -58,8 +59,8 @@ def _write_columns(group: Any, table: Table) -> None:
             group.create_dataset(column.name, data=column.values, dtype=kind)
 
 
-def _write_pictures(group: Any, passing: Iterator[ByteArray], shape: tuple[int, ...]) -> None:
-    written = group.create_dataset("obs/image", shape, np.uint8, chunks=(1, *shape[1:]), compression=1)
+def _write_pictures(group: Any, name: str, passing: Iterator[ByteArray], shape: tuple[int, ...]) -> None:
+    written = group.create_dataset(f"obs/{name}", shape, np.uint8, chunks=(1, *shape[1:]), compression=1)
     for step, picture in enumerate(islice(passing, shape[0])):
         written[step] = picture
 
@@ -68,7 +69,9 @@ def _point_to_next(group: Any, name: str) -> None:
     """Have what is seen a step later without a second copy of it; the last step has its own."""
     seen = group[f"obs/{name}"]
     layout, source = h5py.VirtualLayout(seen.shape, seen.dtype), h5py.VirtualSource(seen)
-    layout[:-1], layout[-1:] = source[1:], source[-1:]
+    layout[-1:] = source[-1:]
+    if len(seen) > 1:
+        layout[:-1] = source[1:]
     group.create_virtual_dataset(f"next_obs/{name}", layout)
 
 

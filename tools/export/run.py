@@ -1,15 +1,17 @@
 """A recorded run as tables: what its recording holds, and what its log of labels knows of it."""
 
 from collections.abc import Iterable, Iterator
+from functools import partial
 from pathlib import Path
 from typing import NamedTuple
 
 from lira.fusion.log.label_log import read_demonstrations
-from lira.hal.bus.topics import CAMERA
+from lira.hal.bus.topics import CAMERA, DEPTH, Topic
 from lira.hal.errors import CodecError, StorageError
+from lira.hal.messages import CompressedImage
 from lira.tools.export.buffer import in_buffer
 from lira.tools.export.columns import Table, tables_of
-from lira.tools.export.pictures import Pictures
+from lira.tools.export.pictures import Cameras, Pictures, color_pictures, depth_pictures
 from lira.tools.export.steps import TOPICS, ExportStep, Heard, episodes_of, steps_of
 from lira.tools.recording.layout import Head
 from lira.tools.recording.reader import Recording
@@ -21,7 +23,7 @@ class RecordedRun(NamedTuple):
 
     head: Head
     tables: list[Table]
-    pictures: Pictures
+    cameras: Cameras
     labels: Path | None
 
     @property
@@ -40,8 +42,20 @@ def load_run(path: Path, labels: Path | None = None) -> RecordedRun:
     tables = tables_of(list(episodes_of(steps)), recording.head.info.profile)
     if not tables:
         raise StorageError(f"nobody decided anything in {path}", "Record while lira fusion or lira drive decides.")
-    pictures = Pictures(lambda: (each.message for each in _readable(recording.messages(CAMERA))))
-    return RecordedRun(recording.head, tables, pictures, log)
+    return RecordedRun(recording.head, tables, cameras_of(recording), log)
+
+
+def cameras_of(recording: Recording) -> dict[str, Pictures]:
+    """The pictures of each camera of which there are any."""
+    profile = recording.head.info.profile
+    found = {"camera": color_pictures(partial(_told, recording, CAMERA))}
+    if profile.depth is not None:
+        found["depth"] = depth_pictures(partial(_told, recording, DEPTH), profile)
+    return {name: each for name, each in found.items() if each.size is not None}
+
+
+def _told(recording: Recording, topic: Topic[CompressedImage]) -> Iterator[CompressedImage]:
+    return (each.message for each in _readable(recording.messages(topic)))
 
 
 def labels_beside(path: Path) -> Path | None:

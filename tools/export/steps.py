@@ -9,15 +9,16 @@ import math
 from collections import deque
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
+from itertools import count
 from typing import Any, Protocol
 
-from lira.hal.bus.topics import APPLIED, CAMERA, DECISION, ODOM, SCAN, Topic
+from lira.hal.bus.topics import APPLIED, CAMERA, DECISION, DEPTH, ODOM, SCAN, Topic
 from lira.hal.clock import is_fresh
 from lira.hal.messages import Applied, Decision, Driver, LaserScan, Odometry, Phase
 
 KEPT = 32  # of each sensor: a decision is told a period after what it was made on
 BREAK_S = 2.0  # a longer silence is the end of an episode
-SENSORS: tuple[Topic[Any], ...] = (SCAN, ODOM, CAMERA)
+SENSORS: tuple[Topic[Any], ...] = (SCAN, ODOM, CAMERA, DEPTH)
 TOPICS: tuple[Topic[Any], ...] = (DECISION, APPLIED, *SENSORS)  # what steps are made of
 
 
@@ -37,13 +38,14 @@ class Heard(Protocol):
 class ExportStep:
     """One decision. What was not there, or stale, is None; `in_buffer`: its label is learned from.
 
-    `picture` is the number of a picture in the recording, from 0.
+    `picture` and `depth` are numbers of pictures in the recording, each counted from 0.
     """
 
     decision: Decision
     scan: LaserScan | None
     odom: Odometry | None
     picture: int | None
+    depth: int | None
     applied: Applied | None
     in_buffer: bool = False
 
@@ -91,11 +93,10 @@ def steps_of(messages: Iterable[Heard]) -> Iterator[ExportStep]:
     senses = {topic.key: _Newest(topic) for topic in SENSORS}
     waiting: ExportStep | None = None
     applied: Applied | None = None
-    pictures = 0
+    numbers = {CAMERA.key: count(), DEPTH.key: count()}
     for each in messages:
-        if each.key == CAMERA.key:
-            senses[each.key].hear(each.message.stamp_s, pictures)
-            pictures += 1
+        if each.key in numbers:
+            senses[each.key].hear(each.message.stamp_s, next(numbers[each.key]))
         elif each.key in senses:
             senses[each.key].hear(each.message.stamp_s, each.message)
         elif each.key == APPLIED.key:
@@ -105,8 +106,8 @@ def steps_of(messages: Iterable[Heard]) -> Iterator[ExportStep]:
             if waiting is not None:
                 yield replace(waiting, applied=applied)
             stored = waiting is not None and _grew(waiting.decision, decision)
-            scan, odom, picture = (senses[topic.key].at(decision.stamp_s) for topic in SENSORS)
-            waiting, applied = ExportStep(decision, scan, odom, picture, None, stored), None
+            scan, odom, picture, depth = (senses[topic.key].at(decision.stamp_s) for topic in SENSORS)
+            waiting, applied = ExportStep(decision, scan, odom, picture, depth, None, stored), None
     if waiting is not None:
         yield replace(waiting, applied=applied)
 
@@ -135,4 +136,4 @@ def episodes_of(steps: Iterable[ExportStep]) -> Iterator[ExportEpisode]:
 
 def _apart(before: Decision, now: Decision) -> bool:
     passed_s = now.stamp_s - before.stamp_s
-    return (before.phase, before.lap) != (now.phase, now.lap) or not 0.0 < passed_s <= BREAK_S or math.isnan(passed_s)
+    return (before.phase, before.lap) != (now.phase, now.lap) or not 0.0 < passed_s <= BREAK_S

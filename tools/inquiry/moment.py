@@ -30,6 +30,7 @@ from lira.tools.runs.plan import Recipe
 
 ROUNDING_S = 1e-6
 ANSWER_S = 1.0  # so much later what a decision led to has been told
+NEAR_S = 0.5
 WINDOW_S = 5.0  # before the moment: what is older was not known any more
 CALLS = (CallName.BEGIN, CallName.UPDATE, CallName.RESET, CallName.END)
 
@@ -51,6 +52,7 @@ class Moment:
     moved: Recorded | None = None
     result: Recorded | None = None
     live: bool = False
+    methods: int = 0  # that had begun by then
 
     def message(self, topic: Topic[Any]) -> Any:
         """The newest of a topic, None if there was none."""
@@ -58,9 +60,9 @@ class Moment:
         return None if found is None else found.message
 
     def age_s(self, topic: Topic[Any]) -> float:
-        """How long ago that came."""
+        """How long ago that was sent."""
         found = self.newest.get(topic.key)
-        return float("inf") if found is None else self.at_s - found.arrived_s
+        return float("inf") if found is None else self.at_s - found.sent_s
 
     @property
     def time_s(self) -> float:
@@ -103,15 +105,24 @@ def moment_at(recording: Recording, at_s: float) -> Moment:
     Raises `StorageError` if nothing was recorded then.
     """
     at_s += ROUNDING_S
-    around = recording.messages(since_s=at_s - WINDOW_S, until_s=at_s + ANSWER_S)
-    moment = gather(recording.head, around, at_s)
+    moment = gather(recording.head, _around(recording, at_s), at_s)
     if not moment.newest:
         began_s = recording.head.began_s
-        ends_s = max((each.arrived_s for each in recording.messages(APPLIED)), default=began_s) - began_s
+        ends_s = max((each.sent_s for each in recording.messages(APPLIED)), default=began_s) - began_s
         what = f"nothing was recorded {at_s - began_s:.1f} s after the beginning"
         raise StorageError(what, f"It has {ends_s:.1f} s.")
-    _learn_of(moment, _calls(recording.messages(METHOD, until_s=at_s + ANSWER_S)))
+    _learn_of(moment, _calls(recording.messages(METHOD)))
     return moment
+
+
+def _around(recording: Recording, at_s: float) -> Iterator[Recorded]:
+    """Yield what was recorded around a time on the robot's clock.
+
+    A twin's may run faster than the clock by which was recorded: then all is gone through.
+    """
+    bounds = {"since_s": at_s - WINDOW_S, "until_s": at_s + ANSWER_S}
+    near = any(abs(each.sent_s - at_s) < NEAR_S for each in recording.messages(APPLIED, **bounds))
+    return recording.messages(**bounds) if near else recording.messages()
 
 
 def moment_now(bus: Bus, head: Head, heard_s: float) -> Moment:
@@ -138,11 +149,13 @@ def gather(head: Head, messages: Iterable[Recorded], at_s: float) -> Moment:
     moment = Moment(head, at_s)
     applied: list[Recorded] = []
     for each in messages:
+        if not at_s - WINDOW_S <= each.sent_s <= at_s + ANSWER_S:
+            continue
         try:
             message = each.message
         except CodecError:
             continue
-        known_s = message.stamp_s if isinstance(message, Decision) else each.arrived_s
+        known_s = message.stamp_s if isinstance(message, Decision) else each.sent_s
         if known_s > at_s:
             applied += [each] if isinstance(message, Applied) else []
             continue
@@ -169,6 +182,7 @@ def _learn_of(moment: Moment, calls: Iterable[MethodCall]) -> None:
             break
         if call.name is CallName.BEGIN:
             of_this, moment.recipe = [], recipe_of(call)
+            moment.methods += 1
         of_this.append(call)
         if call.target == 0 and call.outcome and call.name in CALLS:
             moment.novice = outcome_of(call, OUTCOMES[call.name])
@@ -196,7 +210,7 @@ def last_stop(recording: Recording) -> float:
     for each in recording.messages(APPLIED):
         moves = not is_neutral(each.message.twist)
         if moved and not moves:
-            found_s = each.arrived_s
+            found_s = each.sent_s
         moved = moves
     if found_s is None:
         raise StorageError("the robot never stopped", "Look at a time with --at.")

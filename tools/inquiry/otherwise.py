@@ -64,7 +64,7 @@ class Row(msgspec.Struct, frozen=True):
 
 
 class Moment(msgspec.Struct, frozen=True):
-    """A step in which another would have driven, or another call have been made."""
+    """A step in which another would have driven, or another call have been made. Times since the recording began."""
 
     time_s: float
     was_driver: str
@@ -98,7 +98,7 @@ def compare(again: Again) -> Otherwise:
             steps += 1
             was.note(before)
             now.note(after)
-            moments += _moment(before, after)
+            moments += _moment(before, after, again.trace.began_s)
         else:
             alone += 1
             aside += abs(before.decided.choice.action[1] - after.decided.choice.action[1]) > ASIDE
@@ -106,13 +106,13 @@ def compare(again: Again) -> Otherwise:
     return Otherwise(tuple(_rows((was, now), ends, len(moments))), tuple(moments), steps, alone, aside)
 
 
-def _moment(before: Step, after: Step) -> list[Moment]:
+def _moment(before: Step, after: Step, began_s: float) -> list[Moment]:
     assert before.decided is not None
     assert after.decided is not None
     one, other = before.decided.choice, after.decided.choice
     if (one.driver, one.call) == (other.driver, other.call):
         return []
-    return [Moment(before.time_s, one.driver, other.driver, one.call, other.call)]
+    return [Moment(before.time_s - began_s, one.driver, other.driver, one.call, other.call)]
 
 
 def _rows(sides: tuple[Side, Side], ends: tuple[State, State], moments: int) -> Iterator[Row]:

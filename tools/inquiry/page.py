@@ -25,10 +25,10 @@ def write_page(file: Path, otherwise: Otherwise, trace: Trace, name: str) -> Pat
         f'<p class="outcome">In {len(moments)} of {otherwise.steps} steps of teaching ({share:.0%}) another would have '
         "driven, or another call have been made. The robot is where it was, and the human does what they did.</p>",
         _table(("", "recorded", name), [(row.name, f"{row.was}", f"{row.now}") for row in otherwise.rows]),
-        f"<h2>When</h2>{_strip(steps_of(trace.calls), moments)}",
+        f"<h2>When</h2>{_strip(steps_of(trace.calls), moments, trace.began_s)}",
         f"<h2>The moments{f', the first {MOMENTS}' if len(moments) > MOMENTS else ''}</h2>",
         _table(
-            ("robot's time", "drove", "would drive", "call", "would call"),
+            ("at", "drove", "would drive", "call", "would call"),
             [
                 (f"{each.time_s:.1f} s", each.was_driver, each.now_driver, each.was_call, each.now_call)
                 for each in moments[:MOMENTS]
@@ -45,9 +45,9 @@ def _table(names: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
     return f'<div class="scroll"><table><tr>{head}</tr>{body}</table></div>'
 
 
-def _strip(steps: Sequence[Step], moments: Sequence[Moment]) -> str:
+def _strip(steps: Sequence[Step], moments: Sequence[Moment], began_s: float) -> str:
     """Two lines over the robot's time: where somebody was called, and where it would have been otherwise."""
-    times = [step.time_s for step in steps]
+    times = [step.time_s - began_s for step in steps]
     if len(times) < 2:
         return ""
     scale = (RIGHT - LEFT) / (times[-1] - times[0])
@@ -56,7 +56,9 @@ def _strip(steps: Sequence[Step], moments: Sequence[Moment]) -> str:
     def spans(at: Sequence[float]) -> list[tuple[float, float]]:
         return [(LEFT + (each - times[0]) * scale, LEFT + (each - times[0] + period) * scale) for each in at]
 
-    called = [step.time_s for step in steps if step.decided is not None and step.decided.choice.call != "none"]
+    called = [
+        step.time_s - began_s for step in steps if step.decided is not None and step.decided.choice.call != "none"
+    ]
     parts = [
         text((0.0, TOP + 4.0), "a call", "label"),
         path(bars(spans(called), TOP), "s-feedback", 'stroke-width="12"'),

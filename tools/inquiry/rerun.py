@@ -11,10 +11,12 @@ from dataclasses import dataclass, field
 from lira.fusion.inference.architecture import Weights
 from lira.fusion.inference.threads import one_thread
 from lira.fusion.learning.labels import Label
+from lira.fusion.learning.learned_policy import LearnedPolicy
 from lira.fusion.learning.learner import Learner
 from lira.fusion.learning.trainer import InlineTrainer
 from lira.fusion.log.method_trace import Decided, Learned, State, restored
 from lira.fusion.methods.base import Chooser, Method, Proposal
+from lira.fusion.preprocess import Features
 from lira.hal.errors import ConfigError, PluginError, StorageError
 from lira.hal.messages import CallName, MethodCall, Phase
 from lira.hal.profile import RobotProfile
@@ -45,7 +47,10 @@ class ToldTrainer(InlineTrainer):
 
 @dataclass(frozen=True, slots=True)
 class Difference:
-    """Where two ways part: the number of the call, the robot's time, what was asked, and what came of it in each."""
+    """Where two ways part: the number of the call, what was asked, and what came of it in each.
+
+    `time_s` counts from when the recording began.
+    """
 
     number: int
     time_s: float
@@ -80,11 +85,27 @@ def go_again(trace: Trace, profile: RobotProfile, recipe: Recipe | None = None) 
 
     Raises `ConfigError` for a method or experts that cannot be built here.
     """
+    _one_thread()
+    return _Run(trace, profile, recipe).go()
+
+
+def novice_before(trace: Trace, profile: RobotProfile, number: int) -> tuple[LearnedPolicy, Features]:
+    """Go through a trace up to a call that proposed; return the novice as it was then, and what was seen.
+
+    Raises `ConfigError` as `go_again` does.
+    """
+    _one_thread()
+    run = _Run(trace, profile, None)
+    run.go(until=number)
+    return run.novice, restored(trace.calls[number].features, profile)
+
+
+def _one_thread() -> None:
+    """Compute as whoever teaches does: what comes out depends on it."""
     import torch
 
     torch.set_num_threads(1)
     one_thread()
-    return _Run(trace, profile, recipe).go()
 
 
 class _Run:
@@ -109,8 +130,14 @@ class _Run:
         self._trainers.append(trainer)
         return trainer
 
-    def go(self) -> Again:
-        again, calls = self._again, self._trace.calls
+    @property
+    def novice(self) -> LearnedPolicy:
+        """The policy under training, as it is by now."""
+        return self._method.novice
+
+    def go(self, until: int | None = None) -> Again:
+        """Make all calls, or those before a number."""
+        again, calls = self._again, self._trace.calls[:until]
         try:
             for number, call in enumerate(calls):
                 outcome = self._call(call)
@@ -128,7 +155,9 @@ class _Run:
         self._again.compared += 1
         was = outcome_of(call, OUTCOMES[call.name]) if call.outcome else None
         if was != outcome and repr(was) != repr(outcome):  # nan is no number, and the same
-            self._again.differences.append(Difference(number, self._time_s, call.name, was, outcome))
+            self._again.differences.append(
+                Difference(number, self._time_s - self._trace.began_s, call.name, was, outcome)
+            )
 
     def _call(self, call: MethodCall) -> object:
         """Make one call, and return what came of it where something was recorded of that."""

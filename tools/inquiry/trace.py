@@ -18,9 +18,13 @@ T = TypeVar("T")
 
 @dataclass(slots=True)
 class Trace:
-    """What one method was asked, from its beginning. `missing` counts messages of calls that were not recorded."""
+    """What one method was asked, from its beginning. `missing` counts messages of calls that were not recorded.
+
+    `began_s` is when the recording began, on the robot's clock.
+    """
 
     recipe: Recipe
+    began_s: float = 0.0
     calls: list[MethodCall] = field(default_factory=list)
     missing: int = 0
 
@@ -37,7 +41,7 @@ def read_traces(recording: Recording) -> list[Trace]:
     for each, missing in _in_order(recording):
         for call in each.message.calls:
             if call.name is CallName.BEGIN:
-                traces.append(Trace(recipe_of(call)))
+                traces.append(Trace(recipe_of(call), recording.head.began_s))
             if not traces:
                 what = f"{recording.path} begins in the middle of a run"
                 raise StorageError(what, "Record from before the learner starts: lira fusion does so by itself.")

@@ -155,8 +155,8 @@ def _wheels(moment: Moment) -> Iterator[str]:
         yield "nothing is known of what they got"
         return
     yield from _applied(applied)
-    if moment.result is not None and moment.result.arrived_s > moment.at_s:
-        later_s = moment.result.arrived_s - moment.at_s
+    if moment.result is not None and moment.result.sent_s > moment.at_s:
+        later_s = moment.result.sent_s - moment.at_s
         first, *rest = _applied(moment.result.message)
         yield f"this decision reached them {later_s:.2f} s later: {first}"
         yield from rest
@@ -177,7 +177,7 @@ def _stands(moment: Moment, applied: Applied) -> Iterator[str]:
     yield explain(applied) if applied.reason is not Reason.OK else "who drives wants it to stand"
     if moment.moved is not None:
         last: Applied = moment.moved.message
-        since_s = moment.at_s - moment.moved.arrived_s
+        since_s = moment.at_s - moment.moved.sent_s
         yield f"{since_s:.1f} s before they had {_twist(last.twist)} from {last.source}"
 
 

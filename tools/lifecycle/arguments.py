@@ -70,14 +70,18 @@ def setup_of(args: argparse.Namespace, ports: Ports) -> Setup:
     )
 
 
-def check(setup: Setup) -> None:
-    """Refuse what cannot work before anything starts. Raises `ConfigError` and `MissingExtraError`."""
+def check_packages(setup: Setup) -> None:
+    """Refuse what lacks a package before anything starts. Raises `MissingExtraError`."""
     from lira.tools.cli import EXTRAS
 
     for process in rows(setup):
         for package in process.packages:
             if find_spec(package) is None:
                 raise MissingExtraError(package, EXTRAS[package])
+
+
+def check_method(setup: Setup) -> None:
+    """Refuse a method by which nobody learns. It loads the learner's libraries. Raises `ConfigError`."""
     if "learner" in setup.processes:
         from lira.fusion.methods.presets import method_named
 

@@ -48,7 +48,6 @@ READY = "the scripted person is there"
 SEND_HZ = 30.0
 ANSWER_S = 60.0
 NEW_SHARE = 0.2  # of the newest look in how long a look is expected to take
-MOMENT = 3  # decisions that a novice is expected to go on in the same way
 ZEROS_S = 0.5
 STOPPED = frozenset({Reason.STALE, Reason.NEUTRAL_FIRST, Reason.REFUSED})
 
@@ -123,16 +122,19 @@ class Person:
         else:
             would = decision.novice if decision.driver == Driver.HUMAN else decision.executed
             proposal = Proposal(Features(), Choice(Driver.NOVICE, would, call=decision.call))
-            by_novice = decision.driver in (Driver.NOVICE, Driver.HUMAN)
-            answer = self._teacher.act(state, proposal, self._expected(would, MOMENT if by_novice else 1))
+            answer = self._teacher.act(state, proposal, self._expected(would))
         return None if isinstance(answer, str) else answer
 
-    def _expected(self, action: Action, steps: int) -> Policy:
-        """The action for so many steps, then whichever expert sees something to react to, else the first."""
+    def _expected(self, action: Action) -> Policy:
+        """The action once more, then whichever expert sees something to react to, else the first.
+
+        Who expects that a novice goes on as it is for longer takes over more often, and where nothing was wrong: the
+        labels of that teach the novice less.
+        """
         looks = itertools.count()
 
         def act(features: Features) -> Action:
-            if next(looks) < steps:
+            if next(looks) == 0:
                 return action
             answers = [(expert.act(features), expert.cruise) for expert in self._experts]
             return next((a for a, idle in reversed(answers) if not in_consensus([a, idle], ACTIVE)), answers[0][0])

@@ -110,7 +110,7 @@ class RecordedRobot:
         self._next = next(self._messages, None)
 
     def _advance(self, now_s: float) -> None:
-        while self._next is not None and self._next.arrived_s + self._shift_s <= now_s:
+        while self._next is not None and self._next.sent_s + self._shift_s <= now_s:
             each, self._next = self._next, next(self._messages, None)
             try:
                 message: Any = each.message

@@ -12,7 +12,7 @@ from lira.hal.bus.bus import Bus
 from lira.hal.bus.reader import RawSample, Tap
 from lira.hal.bus.services import info_from_json
 from lira.hal.bus.topics import APPLIED, CLOCK, INFO
-from lira.hal.errors import BusError, CodecError, StorageError
+from lira.hal.errors import BusError, CodecError, LiraError, StorageError
 from lira.tools.recording.backlog import Backlog
 from lira.tools.recording.layout import Head
 from lira.tools.recording.timeline import TimeLine
@@ -71,7 +71,7 @@ class Recorder:
         self._began_s = time.monotonic()
         self._ended = threading.Event()
         self.count = 0
-        self.failure: StorageError | None = None
+        self.failure: LiraError | None = LiraError("the recorder failed", "Tell us what is written above.")
 
     @property
     def lost(self) -> Counter[str]:
@@ -80,7 +80,10 @@ class Recorder:
             return self._backlog.lost.copy()
 
     def run(self, stop: threading.Event, heard: list[RawSample], alive: Callable[[], None] = lambda: None) -> None:
-        """Record until `stop` is set; `alive` is called with every turn. Raises `StorageError` if the disk is full."""
+        """Record until `stop` is set; `alive` is called with every turn. Raises `StorageError` if the disk is full.
+
+        And `LiraError` if the writing thread ended by a fault of its own.
+        """
         clerk = threading.Thread(target=self._write, name="recorder", daemon=True)
         self._push(heard)
         clerk.start()
@@ -106,11 +109,13 @@ class Recorder:
     def _write(self) -> None:
         try:
             with self._writer:
-                self._write_until_ended()
+                failure = self._write_until_ended()
+            self.failure = failure
         except OSError as error:
             self.failure = StorageError(f"the recording ends: {error.strerror}", "Free some space, and start again.")
 
-    def _write_until_ended(self) -> None:
+    def _write_until_ended(self) -> StorageError | None:
+        """Write what comes. Returns why it ended before it was told to."""
         flush_s = look_s = time.monotonic()
         ended = False
         while not ended:
@@ -124,12 +129,12 @@ class Recorder:
                 look_s = now_s + LOOK_S
                 self._tell_losses()
                 if not self._has_room():
-                    self.failure = StorageError(
+                    return StorageError(
                         f"the recording ends: {self._writer.folder} has less than {SPARE_BYTES >> 20} MB left",
                         "Free some space, and start again.",
                     )
-                    return
         self._tell_losses()
+        return None
 
     def _taken(self) -> list[RawSample]:
         with self._lock:

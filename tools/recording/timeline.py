@@ -3,6 +3,7 @@
 from lira.hal.bus.attachment import Attachment
 
 NEAR_NS = 5_000_000_000  # a sender whose clock is further off than that is not believed
+LEAP_NS = 3600_000_000_000  # nor one who says that so much has passed at once, where time is the sender's
 
 
 class TimeLine:
@@ -21,7 +22,10 @@ class TimeLine:
         log_ns = round(arrived_s * 1e9) + self._local_ns
         sent_ns = None if sent is None else sent.time_ns + self._offset_ns
         if self._lockstep:
-            log_ns = self._newest_ns if sent_ns is None else sent_ns
+            first_ns = self._newest_ns or self._offset_ns
+            if sent_ns is not None and abs(sent_ns - first_ns) > LEAP_NS:
+                sent_ns = None
+            log_ns = first_ns if sent_ns is None else sent_ns
         elif sent_ns is not None and abs(sent_ns - log_ns) > NEAR_NS:
             sent_ns = None
         self._newest_ns = max(self._newest_ns, log_ns)

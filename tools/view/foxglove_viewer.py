@@ -59,7 +59,10 @@ class FoxgloveViewer:
 
     def wanted(self) -> Collection[str]:
         """Keys of the topics that anybody is subscribed to."""
-        return [key for key, channel in self._channels.items() if channel.has_sinks()]
+        wanted = [key for key, channel in self._channels.items() if channel.has_sinks()]
+        for key in self._latched.keys() - set(wanted):
+            self._latched[key] = None  # it may change while nobody looks
+        return wanted
 
     def show(self, samples: Sequence[Sample]) -> None:
         """Send samples; whoever subscribes to a latched topic gets its last one."""

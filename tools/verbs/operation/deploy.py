@@ -81,7 +81,7 @@ def run(args: argparse.Namespace) -> int:
 def laptop_plan(args: argparse.Namespace, target: "Target") -> "Plan":
     """What runs beside the robot. Raises `ConfigError` and `MissingExtraError`."""
     from lira.tools.deploy.plans import for_laptop
-    from lira.tools.lifecycle.arguments import Ports, check, setup_of
+    from lira.tools.lifecycle.arguments import Ports, check_method, check_packages, setup_of
 
     # A unit has a folder of its own: what is a file here keeps its whole path.
     for name in ("world", "profile", "policy"):
@@ -91,7 +91,8 @@ def laptop_plan(args: argparse.Namespace, target: "Target") -> "Plan":
     if not args.record and args.set != "look":
         args.without.append("recorder")
     setup = setup_of(args, Ports())
-    check(setup)
+    check_packages(setup)
+    check_method(setup)
     return for_laptop(setup, target.look(setup.name), sys.executable, Path.cwd(), args.keys)
 
 

@@ -32,7 +32,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Bring it up, or say what is up already."""
-    from lira.tools.lifecycle.arguments import Ports, check, setup_of
+    from lira.tools.lifecycle.arguments import Ports, check_packages, setup_of
     from lira.tools.lifecycle.control import bring_up, supervise
     from lira.tools.lifecycle.ports import free_from
     from lira.tools.lifecycle.setup import PAGE_PORT, PORT
@@ -45,7 +45,7 @@ def run(args: argparse.Namespace) -> int:
         print(f"already up{'' if same else ', as something else (lira down ends it)'}:\n\n{as_text(before)}")
         return 0 if same else 1
     setup = setup_of(args, Ports(free_from(PORT), free_from(PAGE_PORT)))
-    check(setup)
+    check_packages(setup)
     if args.stay:
         supervise(setup, say)
         return 0

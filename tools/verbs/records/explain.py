@@ -8,6 +8,7 @@ examples:
   lira explain runs/demo-20261127-101500 --last-call
   lira explain runs/mine --last-stop --out why        with the picture and the scan of that moment, into why/
   lira explain runs/mine --at 52.4 --json -           52.4 s after the recording began
+  lira explain runs/mine --at 52.4 --labels           and which labels made the novice's action
   lira explain --connect 192.168.1.20:7447            the robot as it is now
 """
 
@@ -35,6 +36,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     when.add_argument("--at", type=float, metavar="S", help="at this time, in seconds since the recording began")
     when.add_argument("--last-call", action="store_true", help="when the person was called last")
     when.add_argument("--last-stop", action="store_true", help="when the robot stopped last (default)")
+    add(
+        "--labels",
+        action="store_true",
+        help="and which labels made the novice's action (the run is gone through again)",
+    )
     add("--out", type=Path, metavar="DIR", help="write the picture and the scan of that moment there")
     add_client(parser)
     add_json(parser)
@@ -46,15 +52,16 @@ def run(args: argparse.Namespace) -> int:
     from lira.tools.inquiry.why import plain, words
     from lira.tools.output.machine import take_stdout, write_file
 
-    if args.file is None and (args.at is not None or args.last_call or args.last_stop):
-        raise ConfigError("a time is one of a recording", "Name its file, or ask for now with neither.")
+    if args.file is None and (args.at is not None or args.last_call or args.last_stop or args.labels):
+        raise ConfigError("times and labels are those of a recording", "Name its file, or ask for now with neither.")
     output = take_stdout() if args.json == "-" else sys.stdout
     moment = now(args) if args.file is None else then(args)
     files = [] if args.out is None else write_pictures(moment, args.out)
     text = json.dumps({**plain(moment), "files": [str(path) for path in files]}, indent=2)
     if args.json not in (None, "-"):
         write_file(Path(args.json), text)
-    lines = [*words(moment), *([f"written: {', '.join(map(str, files))}"] if files else [])]
+    lines = [*words(moment), *(behind(args, moment) if args.labels else [])]
+    lines = [*lines, *([f"written: {', '.join(map(str, files))}"] if files else [])]
     print(text if args.json == "-" else "\n".join(lines), file=output, flush=True)
     return 0
 
@@ -68,6 +75,21 @@ def then(args: argparse.Namespace) -> "Moment":
     if args.at is not None:
         return moment_at(recording, recording.head.began_s + args.at)
     return moment_at(recording, last_call(recording) if args.last_call else last_stop(recording))
+
+
+def behind(args: argparse.Namespace, moment: "Moment") -> list[str]:
+    """Which labels made what the novice did."""
+    from lira.tools.inquiry.behind import labels_behind
+    from lira.tools.inquiry.behind import words as behind_words
+    from lira.tools.inquiry.trace import read_traces
+    from lira.tools.recording.reader import Recording
+
+    if moment.step is None:
+        return ["nobody learned then"]
+    head = moment.head
+    trace = read_traces(Recording(args.file))[moment.methods - 1]
+    found = labels_behind(trace, head.info.profile, moment.step.number)
+    return ["the labels behind the novice's action, the largest part first:", *behind_words(found, head.began_s)]
 
 
 def now(args: argparse.Namespace) -> "Moment":

@@ -81,9 +81,9 @@ def write(args: argparse.Namespace, found: "RecordedRun") -> None:
     elif args.format == "robomimic":
         from lira.tools.export.robomimic import write_robomimic
 
-        write_robomimic(found.tables, found.pictures, args.out, {"robot": robot, "world": world})
+        write_robomimic(found.tables, found.cameras, args.out, {"robot": robot, "world": world})
     else:
         from lira.tools.export.lerobot import write_lerobot
 
         task = args.task or (f"drive in {world}" if world else "drive")
-        write_lerobot(found.tables, found.pictures, args.out, robot=robot, task=task, fps=found.fps)
+        write_lerobot(found.tables, found.cameras, args.out, robot=robot, task=task, fps=found.fps)

@@ -129,4 +129,5 @@ def be_robot(args: argparse.Namespace, recording: "Recording", stop: threading.E
         ready=ready,
         stop=stop,
     )
-    say("the recording is over")
+    if robot.ended:
+        say("the recording is over")

@@ -29,7 +29,7 @@ from typing import TYPE_CHECKING
 
 from lira.hal.errors import ConfigError, MissingExtraError
 from lira.hal.messages import Phase
-from lira.tools.options import add_expert, add_layout, add_protocol, add_seed, natural
+from lira.tools.options import add_expert, add_layout, add_protocol, add_record, add_seed, natural
 
 if TYPE_CHECKING:
     from lira.tools.launch.launch import Part
@@ -64,6 +64,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         choices=("sketch", "tiny", "egl"),
         help="what draws and measures the world, as in `lira twin` (default: sketch, if there is no mesh in it)",
     )
+    add_record(parser)
     add("--run", type=Path, metavar="DIR", help="folder of the run (default: runs/demo-<date-time>)")
 
 
@@ -104,6 +105,7 @@ def run(args: argparse.Namespace) -> int:
     fusion += ["--run", str(folder), "--train-laps", str(args.laps), "--unseen", str(args.unseen)]
     fusion += ["--layouts", args.layouts, "--proof", args.proof]
     fusion += ["--shield"] if args.shield else []
+    fusion += ["--no-record"] if args.no_record else []
     fusion += [word for expert in args.expert for word in ("--expert", expert)]
     fusion += ["--as-command", shlex.join(["lira", *sys.argv[1:]])]
     if args.wire:

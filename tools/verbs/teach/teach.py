@@ -33,6 +33,7 @@ if TYPE_CHECKING:
     from lira.tools.runs.plan import Plan
 
 SCRIPT_SPEED = 2.0
+LAPS, SCRIPT_LAPS = 100, 10
 SLOWEST, FASTEST = 0.4, 5.0  # of a person's; slower, a screen would take what the twin says for old
 READY_S = 90.0
 NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_-]{0,31}")
@@ -68,7 +69,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add("--method", default="plus", help=f"way of teaching, as in `lira fusion` {DEFAULT}")
     add("--practice", type=float, metavar="S", help="seconds of driving before it counts (default: 15, scripted: 2)")
     add("--unseen", type=natural, default=12, help=f"layouts that the novice has not seen, to prove itself {DEFAULT}")
-    add("--laps", type=natural, default=100, help=f"end after so many laps of teaching {DEFAULT}")
+    add("--laps", type=natural, help="end after so many laps of teaching (default: 100, scripted: 10)")
     add("--minutes", type=float, metavar="M", help="end after so many minutes of teaching (default: when you end it)")
     add("--whole-time", action="store_true", help="with --minutes: go on though the novice has passed")
     add("--idle-frames", choices=("label", "skip"), default="skip", help=f"steps with the stick at rest {DEFAULT}")
@@ -100,6 +101,7 @@ def run(args: argparse.Namespace) -> int:
 
     scripted = args.person != "hand"
     args.run = args.run or Path("runs") / f"teach-{args.who}-{datetime.now():%Y%m%d-%H%M%S}"
+    args.laps = args.laps or (SCRIPT_LAPS if scripted else LAPS)
     plan = plan_of(args)
     torch.set_num_threads(1)
     one_thread()
