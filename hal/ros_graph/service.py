@@ -38,6 +38,9 @@ class RosService:
                 self._serve(query)
 
     def _serve(self, query: zenoh.Query) -> None:
+        if str(query.key_expr) != self._key:  # who asks all keys at once means none of them
+            self._boundary.refuse(self._key, "not by its name")
+            return
         payload, attached = query.payload, query.attachment
         if payload is not None and len(payload) > QUESTION_BYTES:
             self._boundary.refuse(self._key, "too long")

@@ -301,6 +301,20 @@ def test_the_emergency_stop_is_pressed_and_released_by_services_and_pressed_by_t
         there.drive(publisher, GO, lambda applied: applied.reason is Reason.ESTOP)
 
 
+@pytest.mark.parametrize("expression", ["**", "0/**", "0/estop/**", "0/*/release/**", "0/sim/reset/*/*"])
+def test_who_asks_all_keys_at_once_releases_and_resets_nothing(expression):
+    with offered() as there:
+        assert ask(there, "estop/press") == (True, "emergency")
+        resets = []
+        there.robot.inner.reset = resets.append
+        replies = there.session.get(
+            expression, zenoh.handlers.FifoChannel(64), payload=REQUEST, target=zenoh.QueryTarget.ALL, timeout=1.0
+        )
+        assert [reply for reply in replies if reply.ok is not None and b"emergency" in bytes(reply.ok.payload)] == []
+        assert ask(there, "estop/look")[1] == "emergency"
+        assert resets == []
+
+
 def test_a_twin_starts_afresh_by_a_service():
     with offered() as there:
         resets = []
