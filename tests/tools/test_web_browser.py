@@ -1,11 +1,12 @@
 """A real browser drives a robot by touch, keys and a pad; however its page is lost, the robot stands in time."""
 
+import contextlib
+import os
 import signal
-import subprocess
 import time
 
 import pytest
-from web_bed import Applied, browser, needs_browser, page_of_robot, wait_until
+from web_bed import Applied, browser, descendants, needs_browser, page_of_robot, wait_until
 
 from lira.hal.messages import Source
 
@@ -144,11 +145,13 @@ def reload(driver, _):
 
 
 def freeze(driver, _):
-    """As a phone that is locked: nothing of the browser runs any more."""
-    pids = subprocess.run(["pgrep", "-f", "chromium"], capture_output=True, text=True, check=True).stdout.split()
+    """As a phone that is locked: nothing of this browser runs any more."""
+    pids = descendants(driver.service.process.pid)
+    assert pids, "the browser has no processes"
     for number in (signal.SIGSTOP, signal.SIGCONT):
         for pid in pids:
-            subprocess.run(["kill", f"-{int(number)}", pid], check=False)
+            with contextlib.suppress(ProcessLookupError):
+                os.kill(pid, number)
         time.sleep(1.5)
 
 
@@ -223,7 +226,7 @@ const luminance = (colour) => {
 };
 const behind = (element) => {
   const colour = getComputedStyle(element).backgroundColor;
-  return element === document.documentElement || !/, 0\\)$/.test(colour) ? colour : behind(element.parentElement);
+  return element === document.documentElement || !/^rgba.*, 0\\)$/.test(colour) ? colour : behind(element.parentElement);
 };
 const contrast = (element) => {
   const [one, other] = [getComputedStyle(element).color, behind(element)].map(luminance).sort((a, b) => a - b);

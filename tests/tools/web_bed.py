@@ -6,6 +6,7 @@ import shutil
 import sys
 import threading
 import time
+from pathlib import Path
 
 import pytest
 
@@ -80,6 +81,18 @@ def browser():
     finally:
         with contextlib.suppress(Exception):
             driver.quit()
+
+
+def descendants(pid):
+    """The processes that a process has started, and those that they have, as far as they still run."""
+    parents = {}
+    for path in Path("/proc").glob("[0-9]*/stat"):
+        with contextlib.suppress(OSError):  # ended meanwhile
+            parents[int(path.parent.name)] = int(path.read_text().rpartition(")")[2].split()[1])
+    found = {pid}
+    while new := {child for child, parent in parents.items() if parent in found} - found:
+        found |= new
+    return found - {pid}
 
 
 def wait_until(condition, timeout_s=15.0, what=""):
