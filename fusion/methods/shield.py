@@ -22,6 +22,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from lira.fusion.learning.labels import Label
 from lira.fusion.methods.base import STAND, Choice, Lesson, Method, Policy, Proposal
 from lira.fusion.preprocess import Features
 from lira.hal.errors import ConfigError
@@ -103,6 +104,10 @@ class Shielded(Method):
     def update(self, now_s: float) -> None:
         """As without a shield."""
         self._method.update(now_s)
+
+    def remember(self, label: Label) -> None:
+        """As without a shield."""
+        self._method.remember(label)
 
     def propose(self, features: Features) -> Proposal:
         """What the method proposes, with a turn that is clear. `Proposal.novice` still says what the novice wanted."""
