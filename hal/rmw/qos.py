@@ -22,6 +22,11 @@ class RosQos:
     latched: bool = False
     depth: int | None = 10
 
+    def __str__(self) -> str:
+        """In words."""
+        kept = "all" if self.depth is None else f"last {self.depth}"
+        return f"{'reliable' if self.reliable else 'best effort'}{', transient local' if self.latched else ''}, {kept}"
+
     def encode(self) -> str:
         """As it stands in a token."""
         reliability = "" if self.reliable else _BEST_EFFORT
