@@ -226,7 +226,8 @@ const luminance = (colour) => {
 };
 const behind = (element) => {
   const colour = getComputedStyle(element).backgroundColor;
-  return element === document.documentElement || !/^rgba.*, 0\\)$/.test(colour) ? colour : behind(element.parentElement);
+  const clear = /^rgba.*, 0\\)$/.test(colour);
+  return element === document.documentElement || !clear ? colour : behind(element.parentElement);
 };
 const contrast = (element) => {
   const [one, other] = [getComputedStyle(element).color, behind(element)].map(luminance).sort((a, b) => a - b);
