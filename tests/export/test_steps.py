@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 from heard import DRIVERS, HEIGHT, LENGTHS, PROFILE, WIDTH, Message, decision, label, level, pictures, recording, stamp
 
-from lira.hal.bus.topics import APPLIED, CAMERA, DECISION, SCAN
-from lira.hal.messages import CompressedImage
+from lira.hal.bus.topics import APPLIED, CAMERA, DECISION, METHOD, SCAN
+from lira.hal.messages import CallName, CompressedImage, MethodCall, MethodCalls
 from lira.tools.export.buffer import in_buffer
 from lira.tools.export.columns import SCAN as SCAN_COLUMN
 from lira.tools.export.columns import tables_of
@@ -52,6 +52,16 @@ def test_laps_are_episodes():
     episodes = list(episodes_of(steps()))
     assert [len(each.steps) for each in episodes] == list(LENGTHS)
     assert [each.phase for each in episodes] == ["train", "prove"]
+
+
+def test_a_robot_that_is_put_down_begins_an_episode_though_phase_and_lap_are_the_same():
+    told = []
+    for each in recording():
+        if each.key == DECISION.key and each.message.stamp_s == stamp(4):
+            told.append(Message(METHOD.key, MethodCalls(stamp(4), (MethodCall(CallName.RESET),))))
+        told.append(each)
+    first, *rest = LENGTHS
+    assert [len(each.steps) for each in episodes_of(steps(told))] == [4, first - 4, *rest]
 
 
 @pytest.mark.parametrize("shift_s", [3.0, -50.0])

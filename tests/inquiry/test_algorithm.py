@@ -81,7 +81,7 @@ def test_what_is_no_line_of_it_is_said_to_be_none(moment, recipe, novice, words)
 def test_an_expert_that_holds_an_action_is_active_for_another_reason_than_one_that_changes_it():
     settings = settings_of(PLUS)
     changing = expert("camera", 0.5, active=True)
-    assert activity(changing, 0.06, settings) == "A 0.070 > theta 0.060: active"
+    assert activity(changing, 0.06, settings) == "A 0.070 > threshold 0.060: active"
     assert "away from its cruise by more than 0.20" in activity(replace(changing, activation=0.0), 0.06, settings)
     assert activity(replace(changing, active=False, activation=0.01), 0.06, settings).endswith("inactive")
     assert settings_of(Recipe(method_named("hg-dagger"), 0, "line")) is None

@@ -177,7 +177,7 @@ def test_a_recovered_recording_is_whole_for_everybody(tmp_path):
 def test_a_summary_counts_by_topic_and_says_what_is_missing(tmp_path):
     numbers = [0, 1, 2, 6, 7]
     answers = [sample(COUNTED, Odometry(1.0, 0.0, 0.0, 0.0, 0.0, 0.0), seq=n, sent_s=5.0 + n) for n in numbers]
-    write(tmp_path / "rec", [battery(5.0), *answers, picture(9, 13.0)])
+    write(tmp_path / "rec", [battery(1.0), *answers, picture(9, 13.0)])  # the battery told before it was recorded
     summary = summarise(Recording(tmp_path / "rec"))
     assert summary.count == 7
     assert summary.duration_s == 8.0

@@ -56,7 +56,7 @@ def keys(_: Patient) -> Finding:
     """The keys of the bus, if LIRA_KEYS names some. Raises `ConfigError` for what is wrong with them."""
     bundle = keys_from_environment()
     if bundle is None:
-        return ok(f"no keys ({VARIABLE} is not set): the bus is open to everybody in the network", keys="")
+        return ok(f"no keys ({VARIABLE} is not set): robots are served to this machine alone", keys="")
     return ok(f"keys of '{bundle.name}' in {bundle.folder}", keys=bundle.name)
 
 

@@ -2,7 +2,8 @@
 
 A step is a decision of `lira/decision`. Its sensors are the newest that had been measured by then and were not stale,
 as in an `Observation`, and `applied` is the last that the wheels got before the next decision. Episodes are whole laps,
-whoever drove and whatever was learned from them. Pictures are named by their number: a run's do not fit into memory.
+whoever drove and whatever was learned from them; where the robot is put down after a crash another begins. Pictures are
+named by their number: a run's do not fit into memory.
 """
 
 import math
@@ -12,14 +13,14 @@ from dataclasses import dataclass, replace
 from itertools import count
 from typing import Any, Protocol
 
-from lira.hal.bus.topics import APPLIED, CAMERA, DECISION, DEPTH, ODOM, SCAN, Topic
+from lira.hal.bus.topics import APPLIED, CAMERA, DECISION, DEPTH, METHOD, ODOM, SCAN, Topic
 from lira.hal.clock import is_fresh
-from lira.hal.messages import Applied, Decision, Driver, LaserScan, Odometry, Phase
+from lira.hal.messages import Applied, CallName, Decision, Driver, LaserScan, Odometry, Phase
 
 KEPT = 32  # of each sensor: a decision is told a period after what it was made on
 BREAK_S = 2.0  # a longer silence is the end of an episode
 SENSORS: tuple[Topic[Any], ...] = (SCAN, ODOM, CAMERA, DEPTH)
-TOPICS: tuple[Topic[Any], ...] = (DECISION, APPLIED, *SENSORS)  # what steps are made of
+TOPICS: tuple[Topic[Any], ...] = (DECISION, APPLIED, METHOD, *SENSORS)  # what steps are made of
 
 
 class Heard(Protocol):
@@ -36,7 +37,8 @@ class Heard(Protocol):
 
 @dataclass(frozen=True, slots=True)
 class ExportStep:
-    """One decision. What was not there, or stale, is None; `in_buffer`: its label is learned from.
+    """One decision. What was not there, or stale, is None; `in_buffer`: its label is learned from; `begins`: the robot
+    was put down before it.
 
     `picture` and `depth` are numbers of pictures in the recording, each counted from 0.
     """
@@ -48,6 +50,7 @@ class ExportStep:
     depth: int | None
     applied: Applied | None
     in_buffer: bool = False
+    begins: bool = False
 
     @property
     def intervention(self) -> bool:
@@ -93,6 +96,7 @@ def steps_of(messages: Iterable[Heard]) -> Iterator[ExportStep]:
     senses = {topic.key: _Newest(topic) for topic in SENSORS}
     waiting: ExportStep | None = None
     applied: Applied | None = None
+    begins = False
     numbers = {CAMERA.key: count(), DEPTH.key: count()}
     for each in messages:
         if each.key in numbers:
@@ -101,13 +105,16 @@ def steps_of(messages: Iterable[Heard]) -> Iterator[ExportStep]:
             senses[each.key].hear(each.message.stamp_s, each.message)
         elif each.key == APPLIED.key:
             applied = each.message
+        elif each.key == METHOD.key:
+            begins |= any(call.name == CallName.RESET for call in each.message.calls)
         elif each.key == DECISION.key:
             decision = each.message
             if waiting is not None:
                 yield replace(waiting, applied=applied)
             stored = waiting is not None and _grew(waiting.decision, decision)
             scan, odom, picture, depth = (senses[topic.key].at(decision.stamp_s) for topic in SENSORS)
-            waiting, applied = ExportStep(decision, scan, odom, picture, depth, None, stored), None
+            waiting = ExportStep(decision, scan, odom, picture, depth, None, stored, begins)
+            applied, begins = None, False
     if waiting is not None:
         yield replace(waiting, applied=applied)
 
@@ -123,10 +130,10 @@ def _stored(decision: Decision) -> int:
 
 
 def episodes_of(steps: Iterable[ExportStep]) -> Iterator[ExportEpisode]:
-    """Yield laps: another phase or lap, a silence or a clock that runs back begins the next."""
+    """Yield laps: another phase or lap, a robot put down anew, a silence or a clock that runs back begins the next."""
     lap: list[ExportStep] = []
     for step in steps:
-        if lap and _apart(lap[-1].decision, step.decision):
+        if lap and (step.begins or _apart(lap[-1].decision, step.decision)):
             yield ExportEpisode(tuple(lap))
             lap = []
         lap.append(step)

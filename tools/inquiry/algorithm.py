@@ -92,11 +92,11 @@ def settings_of(recipe: Recipe | None) -> LiraSettings | None:
 
 
 def activity(expert: ExpertView, threshold: float, settings: LiraSettings | None) -> str:
-    """Why an expert is active or not (eq. 1)."""
+    """Why an expert is active or not (eq. 1); the threshold is theta times the range of an action."""
     if not expert.active:
-        return f"A {expert.activation:.3f}, theta {threshold:.3f}: inactive"
+        return f"A {expert.activation:.3f}, threshold {threshold:.3f}: inactive"
     if expert.activation > threshold:
-        return f"A {expert.activation:.3f} > theta {threshold:.3f}: active"
+        return f"A {expert.activation:.3f} > threshold {threshold:.3f}: active"
     held = "" if settings is None or settings.hold is None else f" by more than {settings.hold:.2f}"
     return f"A {expert.activation:.3f}, but it holds an action away from its cruise{held}: active"
 

@@ -7,13 +7,10 @@ from typing import Any
 from mcap.records import Attachment, Channel, Footer, Message, Metadata, Schema
 from mcap.writer import CompressionType, Writer
 
-from lira.hal.bus.topics import TOPICS
 from lira.tools.recording.bag import BagFile, write_bag
-from lira.tools.recording.layout import BAG, PROFILE, files_of
+from lira.tools.recording.layout import BAG, LATCHED, PROFILE, files_of
 from lira.tools.recording.reader import Recording
 from lira.tools.recording.writer import CHUNK_BYTES
-
-_LATCHED = {topic.key for topic in TOPICS if topic.qos.latched}
 
 
 def recover(path: Path) -> Iterator[str]:
@@ -27,7 +24,7 @@ def recover(path: Path) -> Iterator[str]:
             _rewrite(each, records, recording.head.version)
         found = BagFile(each)
         for topic, ros_type, log_ns in _messages(Recording(each), each):
-            latched = topic.removeprefix(f"/{recording.head.robot}/") in _LATCHED
+            latched = topic.removeprefix(f"/{recording.head.robot}/") in LATCHED
             found.note(topic, ros_type, log_ns, latched=latched)
         bag.append(found)
         yield f"{each}: {'whole' if records is None else 'mended'}, {found.count} messages"

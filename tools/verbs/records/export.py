@@ -32,7 +32,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "file",
         type=Path,
         metavar="FILE",
-        help="an .mcap file, the folder of a recording, or of a run; of onnx: a novice",
+        help="an .mcap file, the folder of a recording, or of a run; of onnx: a novice, or the folder of its run",
     )
     add(
         "out",
@@ -63,8 +63,9 @@ def write_network(args: argparse.Namespace) -> int:
     """Read a novice or an expert, and write it."""
     from lira.fusion.inference.checkpoint import load_checkpoint
     from lira.tools.export.onnx_file import write_onnx
+    from lira.tools.runs.names import NOVICE
 
-    network, checkpoint = load_checkpoint(args.file)
+    network, checkpoint = load_checkpoint(args.file / NOVICE if args.file.is_dir() else args.file)
     write_onnx(network, checkpoint, args.out)
     kind = {"fusion": "a novice", "kernel": "a kernel novice"}.get(checkpoint.kind, f"a {checkpoint.kind} expert")
     print(f"written: {args.out}: {kind} of '{checkpoint.profile}' that sees {' and '.join(checkpoint.features)}")

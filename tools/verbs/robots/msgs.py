@@ -12,7 +12,7 @@ examples:
 import argparse
 from pathlib import Path
 
-from lira.hal.errors import ConfigError
+from lira.hal.errors import ConfigError, StorageError
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -29,9 +29,12 @@ def run(args: argparse.Namespace) -> int:
     folder = args.out / PACKAGE
     if folder.exists() and not (folder / "package.xml").is_file():
         raise ConfigError(f"{folder} is there and is no ROS package", "Name another folder, or move that one away.")
-    for name, text in package_files(version()).items():
-        path = folder / name
-        path.parent.mkdir(parents=True, exist_ok=True)
-        path.write_text(text, encoding="utf-8")
+    try:
+        for name, text in package_files(version()).items():
+            path = folder / name
+            path.parent.mkdir(parents=True, exist_ok=True)
+            path.write_text(text, encoding="utf-8")
+    except OSError as error:
+        raise StorageError(f"cannot write {folder}: {error.strerror}", "Choose another folder.") from error
     print(f"{folder}: build it with: colcon build --packages-select {PACKAGE}")
     return 0
