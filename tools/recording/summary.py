@@ -81,7 +81,7 @@ class Summary:
 
     @property
     def duration_s(self) -> float:
-        """From the first message to the last, on the robot's clock, but for those that were sent once, maybe long before."""
+        """From the first message to the last, on the robot's clock; those sent once, maybe long before, aside."""
         firsts = [topic.first_s for topic in self.topics.values() if topic.key not in LATCHED]
         return max((topic.last_s for topic in self.topics.values()), default=0.0) - min(firsts, default=0.0)
 
