@@ -36,7 +36,7 @@ GROUPS = {
         "drive": "let a novice or an expert drive, also on the robot itself",
         "train-expert": "train the camera or the lidar expert",
         "experiment": "repeat an experiment of the thesis, with statistics",
-        "labels": "look through a log of labels for damage, and repair it",
+        "labels": "a log of labels: list, undo, explain, merge, look for damage and repair it",
     },
     ("screens", "Hand and eye"): {
         "joystick": "drive by hand: a gamepad on this machine, straight to the robot",
