@@ -25,7 +25,7 @@ def only_instance(robot: str) -> Iterator[None]:
     except BlockingIOError:
         raise BusError(
             f"a robot named '{robot}' already runs on this machine ({path} is locked)",
-            "Stop it, or give this one another name.",
+            "Stop it, or give this one another name: --name, and --listen with another port.",
         ) from None
     except OSError as error:
         raise BusError(f"cannot lock {path}: {error.strerror}", _REMEDY) from error

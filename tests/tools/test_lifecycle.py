@@ -7,7 +7,7 @@ import sys
 import pytest
 
 from lira.hal.errors import ConfigError, MissingExtraError
-from lira.tools.cli import EXTRAS, Parser
+from lira.tools.cli import EXTRAS, Parser, main
 from lira.tools.launch.processes import free_port
 from lira.tools.lifecycle.arguments import Ports, add_setup, check_method, check_packages, setup_of
 from lira.tools.lifecycle.ports import free_from
@@ -126,6 +126,13 @@ def test_a_real_robot_is_reached_where_it_is():
 def test_what_does_not_go_together_is_refused_before_anything_starts(words):
     with pytest.raises(ConfigError):
         asked(*words)
+
+
+def test_a_novice_that_is_not_there_is_refused_before_anything_starts(tmp_path, monkeypatch, capsys):
+    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path))
+    monkeypatch.setenv("XDG_RUNTIME_DIR", str(tmp_path))
+    assert main(["up", "--name", "absent", "--policy", str(tmp_path / "novice.safetensors")]) == 2
+    assert "there is no novice" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize("method", ["nobody-knows-it", "switching"])
