@@ -86,7 +86,8 @@ def button(driver, control):
 def at(driver, learner, stage, **words):
     """The session is at this stage, and the page shows it."""
     learner.state = SessionState(1.0, stage, "ada", laps=2, passed=1, curve=(0.4, 0.9), **words)
-    said = {Stage.PROVING: "TO BE JUDGED", Stage.JUDGING: "FOR YOU TO JUDGE", Stage.EXAM: "TWIN OF ITS OWN"}
+    # Of judging nothing is waited for: that this robot stands, which nobody drives here, is said before it.
+    said = {Stage.PROVING: "TO BE JUDGED", Stage.EXAM: "TWIN OF ITS OWN"}
     said |= {Stage.PRACTICE: "PRACTICE", Stage.READY: "READY", Stage.VERDICT: "IT PASSED"}
     if stage in said:
         wait_until(lambda: said[stage] in text(driver, "who"), what=f"{stage} is not shown")
