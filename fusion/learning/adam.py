@@ -25,8 +25,10 @@ class Adam:
 
     @torch.no_grad()
     def step(self) -> None:
-        """Change every parameter by its `grad`; one that has none stays."""
+        """Change every parameter by its `grad`; one that has none stays, and so does all where none has one."""
         moved = [k for k, parameter in enumerate(self._parameters) if parameter.grad is not None]
+        if not moved:
+            return
         steps = [self._steps[k] for k in moved]
         torch._foreach_add_(steps, 1)
         torch._fused_adam_(

@@ -41,3 +41,10 @@ def test_who_trains_does_not_load_a_compiler():
         "sys.exit('torch._dynamo' in sys.modules)\n"
     )
     assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
+
+
+def test_where_nothing_has_a_gradient_nothing_moves():
+    parameter = torch.nn.Parameter(torch.ones(3))
+    Adam([parameter], 1e-3).step()
+    Adam([], 1e-3).step()
+    assert torch.equal(parameter, torch.ones(3))
