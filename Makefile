@@ -10,7 +10,7 @@ EXPERTS := $(foreach task,line eight passage garden corridor,camera:--task:$(tas
 BENCHES := twin lockstep latency train preprocess step log drivers takeover web
 
 .DEFAULT_GOAL := help
-.PHONY: help setup foreign demo test test-fast check docs generated bench results experts wheel clean
+.PHONY: help setup foreign demo test test-fast test-long check docs generated bench results experts wheel clean
 
 help: ## list what can be made
 	@awk -F ':[^#]*## ' '/^[a-z-]+:.*## / {printf "  make %-10s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
@@ -38,6 +38,9 @@ demo: setup ## teach a robot in the twin, from start to report
 test: setup ## every test: most beside each other, then those that need the machine for themselves
 	$(BIN)/python -m pytest --crowd --numprocesses $(TEST_WORKERS) --dist worksteal
 	$(BIN)/python -m pytest --alone
+
+test-long: setup ## a scripted person teaches to a pass in real time, by pad and by page: ten minutes or more, alone
+	LIRA_LONG=1 $(BIN)/python -m pytest tests/tools/test_taught_by_hand.py
 
 test-fast: setup ## the unit tests, in under a minute
 	$(BIN)/python -m pytest -m unit

@@ -18,7 +18,7 @@ from pathlib import Path
 import pytest
 from foreign import NOT_INSTALLED
 from hypothesis import settings
-from kinds import kind_of
+from kinds import TAKES_LONG, kind_of
 from loopback import take_own_loopback
 
 # A shell that runs the suite in the background ignores SIGINT, and so would every process that a test starts.
@@ -35,6 +35,7 @@ EXPECTED_SKIPS = {
     "no package index answers",
     "no client of others is installed",
     *NOT_INSTALLED,
+    TAKES_LONG,
 }
 OPEN = "lira/open"  # in pytest's cache: what failed in the crowd
 MOST_OPEN = 40

@@ -5,10 +5,13 @@ server, a bus or a line, and mostly waits for them.
 """
 
 import ast
+import os
 from functools import cache
 from pathlib import Path
 
 ROOT = Path(__file__).parent.parent
+LONG = os.environ.get("LIRA_LONG") == "1"
+TAKES_LONG = "takes many minutes in real time (make test-long)"
 PROCESSES = (
     "lira.hal.bus.bus",
     "lira.hal.server",

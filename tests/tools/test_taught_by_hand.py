@@ -10,6 +10,7 @@ import time
 
 import pytest
 from fingers import Fingers
+from kinds import LONG, TAKES_LONG
 from pad_bed import SONY, Bed, library
 from web_bed import browser, needs_browser, wait_until
 
@@ -21,7 +22,7 @@ from lira.tools.launch.processes import ChildProcess, free_port, lira_command
 from lira.tools.live.scripted_person import live, person_for
 from lira.tools.report.digest import load_run
 
-pytestmark = [pytest.mark.slow, pytest.mark.alone]
+pytestmark = [pytest.mark.slow, pytest.mark.alone, pytest.mark.skipif(not LONG, reason=TAKES_LONG)]
 WORLD, SPEED = "line-obstacles", 1.5
 PAD = 5
 READY_S, WHOLE_S = 90.0, 600.0
