@@ -143,7 +143,7 @@ class TracedMethod(Method):
     def remember(self, label: Label) -> None:
         """Have the novice take in a label from before."""
         self._notes.add(CallName.REMEMBER, argument=label.source, action=label.action, features=kept(label.features))
-        self.novice.remember(label)
+        self._method.remember(label)
 
     def reset(self) -> None:
         """Begin an episode."""

@@ -13,7 +13,7 @@ from lira.hal.bus.attachment import Attachment, parse_attachment
 from lira.hal.bus.boundary import Boundary
 from lira.hal.bus.connection import Connection, Declared
 from lira.hal.bus.publisher import shifted
-from lira.hal.bus.topics import ATTACHMENT_BYTES, BY, MESSAGE_BYTES, TOPICS, Topic
+from lira.hal.bus.topics import ATTACHMENT_BYTES, BY, LATCHED_KEYS, MESSAGE_BYTES, TOPICS, Topic
 from lira.hal.clock import OWN_TIME, TimeBase
 from lira.hal.messages.codec import decode
 
@@ -21,7 +21,6 @@ M = TypeVar("M")
 
 DEPTH = 8192  # between two polls: some seconds of a robot in lockstep at a hundred times real time
 LATCHED_DEPTH = 64
-_LATCHED = {topic.key: topic for topic in TOPICS if topic.qos.latched}
 _TYPES = {topic.key: topic.ros_type for topic in TOPICS}
 
 
@@ -166,7 +165,7 @@ class Tap:
         self._live = connection.declare(partial(_all_below, f"{prefix}/**" if prefix else "**"))
         self._latched = [
             connection.declare(partial(subscribe, f"{prefix}/{key}".lstrip("/"), LATCHED_DEPTH, latched=True))
-            for key in _LATCHED
+            for key in sorted(LATCHED_KEYS)
         ]
         self.full = False  # the last poll took all that is kept, so older messages may have been lost
 
@@ -175,7 +174,7 @@ class Tap:
         found = [sample for each in self._latched for sample in self._drain(each, LATCHED_DEPTH)]
         live = self._drain(self._live, DEPTH)
         self.full = len(live) == DEPTH
-        return found + [sample for sample in live if sample.key not in _LATCHED]
+        return found + [sample for sample in live if sample.key not in LATCHED_KEYS]
 
     def _drain(self, declared: Any, most: int) -> list[RawSample]:
         found: list[RawSample] = []

@@ -168,6 +168,7 @@ FROM_OPERATORS: tuple[Topic[Any], ...] = (
     DIAGNOSTICS,
 )
 
+LATCHED_KEYS = frozenset(topic.key for topic in TOPICS if topic.qos.latched)  # sent once, for all who ever come
 
 BY = "/by/"
 

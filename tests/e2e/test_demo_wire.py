@@ -1,24 +1,11 @@
 """The main job through the robot's drivers, on a very short course: emulated devices, `lira robot`, the learner."""
 
 import pytest
+from short_worlds import FEW_METRES
 
 from lira.fusion.log.run_log import LapRecord, ResultRecord, StepRecord, read_run
 from lira.tools.launch.processes import ChildProcess, lira_command
 
-WORLD = """
-description = "A few metres of straight line with one box on it"
-
-[line]
-pieces = [{ straight_m = 14.0 }]
-
-[[box]]
-x_m = 5.0
-y_m = 0.0
-
-[limits]
-finish_m = 8.0
-lost_m = 1.5
-"""
 DEMO_S = 150.0
 
 
@@ -26,7 +13,7 @@ DEMO_S = 150.0
 def demo(tmp_path_factory):
     """One training lap and its proving run: 20 s of driving in real time."""
     folder = tmp_path_factory.mktemp("demo")
-    (folder / "few.toml").write_text(WORLD)
+    (folder / "few.toml").write_text(FEW_METRES)
     words = ["demo", "--wire", "--world", str(folder / "few.toml"), "--laps", "1", "--unseen", "0"]
     words += ["--method", "hold", "--layouts", "own", "--proof", "own"]
     run = folder / "run"

@@ -8,6 +8,7 @@ import numpy as np
 import pyarrow.parquet as pq
 import pytest
 from rerun.chunk import RrdReader
+from short_worlds import SHORT
 
 from lira.fusion.log.label_log import read_demonstrations
 from lira.fusion.modalities.image import gray_image
@@ -17,20 +18,6 @@ from lira.tools.export.columns import SCAN
 from lira.tools.export.run import load_run
 from lira.tools.launch.processes import ChildProcess, free_port, lira_command
 
-WORLD = """
-description = "A short straight line with one box on it"
-
-[line]
-pieces = [{ straight_m = 18.0 }]
-
-[[box]]
-x_m = 6.0
-y_m = 0.0
-
-[limits]
-finish_m = 12.0
-lost_m = 1.5
-"""
 RUN_S = 120.0
 
 
@@ -38,7 +25,7 @@ RUN_S = 120.0
 def run(tmp_path_factory):
     """Folder of a run of one lap, recorded by `lira record`."""
     folder = tmp_path_factory.mktemp("export")
-    (folder / "short.toml").write_text(WORLD)
+    (folder / "short.toml").write_text(SHORT)
     endpoint = f"127.0.0.1:{free_port()}"
     robot = ["--name", f"x{uuid.uuid4().hex}"]
     at = [*robot, "--connect", endpoint]

@@ -6,6 +6,7 @@ from functools import partial
 import pytest
 import torch
 from safetensors.numpy import load_file
+from short_worlds import SHORT
 
 from lira.fusion.control import ControlLoop
 from lira.fusion.learning.trainer import ProcessTrainer
@@ -23,20 +24,6 @@ from lira.tools.launch.processes import ChildProcess, lira_command
 from lira.tools.runs.build import build_method, teacher
 from lira.tools.runs.course import lap
 
-WORLD = """
-description = "A short straight line with one box on it"
-
-[line]
-pieces = [{ straight_m = 18.0 }]
-
-[[box]]
-x_m = 6.0
-y_m = 0.0
-
-[limits]
-finish_m = 12.0
-lost_m = 1.5
-"""
 LAPS = 2
 DEMO_S = 120.0
 
@@ -44,7 +31,7 @@ DEMO_S = 120.0
 @pytest.fixture(scope="module")
 def world(tmp_path_factory):
     path = tmp_path_factory.mktemp("world") / "short.toml"
-    path.write_text(WORLD)
+    path.write_text(SHORT)
     return path
 
 

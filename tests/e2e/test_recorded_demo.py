@@ -3,31 +3,18 @@
 import json
 
 import pytest
+from short_worlds import FEW_METRES
 
 from lira.tools.cli import main
 from lira.tools.launch.processes import ChildProcess, lira_command
 
-WORLD = """
-description = "A few metres of straight line with one box on it"
-
-[line]
-pieces = [{ straight_m = 14.0 }]
-
-[[box]]
-x_m = 5.0
-y_m = 0.0
-
-[limits]
-finish_m = 8.0
-lost_m = 1.5
-"""
 DEMO_S = 150.0
 
 
 @pytest.fixture(scope="module")
 def run(tmp_path_factory):
     folder = tmp_path_factory.mktemp("demo")
-    (folder / "few.toml").write_text(WORLD)
+    (folder / "few.toml").write_text(FEW_METRES)
     words = ["demo", "--world", str(folder / "few.toml"), "--laps", "1", "--unseen", "1"]
     with ChildProcess("demo", lira_command(*words, "--run", str(folder / "run")), folder / "demo.log") as child:
         assert child.wait(DEMO_S) in (0, 1), child.output()

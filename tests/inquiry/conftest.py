@@ -4,6 +4,7 @@ from functools import partial
 
 import pytest
 import torch
+from short_worlds import FEW_METRES
 
 from lira.fusion.inference.threads import one_thread
 from lira.fusion.learning.trainer import InlineTrainer
@@ -12,25 +13,13 @@ from lira.tools.runs.plan import Plan
 from lira.tools.runs.simulated import simulate
 from lira.tools.runs.teach import teach_on
 
-WORLD = """
-description = "A few metres of straight line with one box on it"
-[line]
-pieces = [{ straight_m = 14.0 }]
-[[box]]
-x_m = 5.0
-y_m = 0.0
-[limits]
-finish_m = 8.0
-lost_m = 1.5
-"""
-
 
 def taught(method, tmp_path):
     """Teach for one lap; return the profile and all that was told on the bus."""
     torch.set_num_threads(1)  # as whoever teaches does: sums depend on it
     one_thread()
     path = tmp_path / "few.toml"
-    path.write_text(WORLD)
+    path.write_text(FEW_METRES)
     reports = []
     with simulate(str(path), "thesis-sim", renderer="sketch") as robot:
         trainer = partial(InlineTrainer, adopt_after_s=robot.profile.period_s)

@@ -5,7 +5,6 @@ import contextlib
 import os
 import resource
 import socket
-import sys
 import threading
 import time
 import urllib.request
@@ -15,7 +14,7 @@ import numpy as np
 import pytest
 from foxglove_client import PROTOCOL, connect
 from prometheus_client.parser import text_string_to_metric_families
-from web_bed import policy, wait_until
+from web_bed import robot_that_drives, wait_until
 
 from lira.hal.bus.bus import Bus
 from lira.hal.bus.reader import RawSample
@@ -24,7 +23,6 @@ from lira.hal.bus.topics import APPLIED, BATTERY, CAMERA, ODOM, PICTURE, SCAN, T
 from lira.hal.messages import BatteryState, CompressedImage, Odometry, Reason
 from lira.hal.messages.codec import encode
 from lira.hal.profile import load_profile
-from lira.tools.bench.parts import null_robot
 from lira.tools.cli import main
 from lira.tools.launch.processes import ChildProcess, free_port, lira_command
 from lira.tools.recording.layout import Head
@@ -36,20 +34,6 @@ from lira.tools.view.stream import stream
 
 PROFILE = load_profile("thesis-sim")
 RATES = {"/scan": 10.0, "/odom": 20.0, "/cmd_vel/applied": 20.0}
-
-
-@contextlib.contextmanager
-def robot_that_drives(folder):
-    """Its name, its address and the bus, while a policy drives it."""
-    name, endpoint = f"view{os.getpid()}", f"127.0.0.1:{free_port()}"
-    command = [sys.executable, "-m", "lira.tools.bench.parts.null_robot", name, endpoint]
-    with contextlib.ExitStack() as stack:
-        server = stack.enter_context(ChildProcess("the robot", command, folder / "robot.log"))
-        server.wait_ready(null_robot.READY, 30.0)
-        bus = Bus(name, connect=endpoint)
-        stack.callback(bus.close)
-        stack.enter_context(policy(name, endpoint))
-        yield name, endpoint, bus
 
 
 @pytest.fixture(scope="module")

@@ -47,16 +47,24 @@ def policy(name, endpoint):
 
 
 @contextlib.contextmanager
-def page_of_robot(folder):
-    """The bus, the page's address, and `lira web` as a process, while a policy drives the robot."""
-    name, endpoint, port = f"web{os.getpid()}", f"127.0.0.1:{free_port()}", free_port()
-    robot = [sys.executable, "-m", "lira.tools.bench.parts.null_robot", name, endpoint]
+def robot_that_drives(folder):
+    """Its name, its address and the bus, while a policy drives it."""
+    name, endpoint = f"driven{os.getpid()}", f"127.0.0.1:{free_port()}"
+    command = [sys.executable, "-m", "lira.tools.bench.parts.null_robot", name, endpoint]
     with contextlib.ExitStack() as stack:
-        server = stack.enter_context(ChildProcess("the robot", robot, folder / "robot.log"))
+        server = stack.enter_context(ChildProcess("the robot", command, folder / "robot.log"))
         server.wait_ready(null_robot.READY, 30.0)
         bus = Bus(name, connect=endpoint)
         stack.callback(bus.close)
         stack.enter_context(policy(name, endpoint))
+        yield name, endpoint, bus
+
+
+@contextlib.contextmanager
+def page_of_robot(folder):
+    """The bus, the page's address, and `lira web` as a process, while a policy drives the robot."""
+    port = free_port()
+    with robot_that_drives(folder) as (name, endpoint, bus), contextlib.ExitStack() as stack:
         words = ["--name", name, "--connect", endpoint, "--port", str(port)]
         web = stack.enter_context(ChildProcess("lira web", lira_command("web", *words), folder / "web.log"))
         web.wait_ready("web shows", 30.0)

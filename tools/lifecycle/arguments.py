@@ -87,3 +87,9 @@ def check_method(setup: Setup) -> None:
 
         if not method_named(setup.method).approach.learns:
             raise ConfigError(f"by the method '{setup.method}' nobody learns", "Choose another --method.")
+
+
+def check_policy(setup: Setup) -> None:
+    """Refuse a novice that is not there. Raises `ConfigError`."""
+    if setup.policy.endswith(".safetensors") and not Path(setup.policy).is_file():
+        raise ConfigError(f"there is no novice {setup.policy}", "Name novice.safetensors in the folder of a run.")

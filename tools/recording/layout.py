@@ -11,7 +11,6 @@ from pathlib import Path
 import msgspec
 
 from lira.hal.bus.services import LOCKSTEP, Info
-from lira.hal.bus.topics import TOPICS
 from lira.hal.errors import StorageError
 
 FOLDER = "recording"  # in that of a run
@@ -21,7 +20,6 @@ PROFILE, ENCODING, SCHEMA_ENCODING = "ros2", "cdr", "ros2msg"
 ATTACHMENT_KEY, ATTACHMENT_TYPE = "lira/attachment", "lira_msgs/msg/Attachment"
 HEAD, LOSSES = "lira.recording", "lira.losses"  # names of MCAP metadata
 INFO = "info.json"  # name of an MCAP attachment
-LATCHED = {topic.key for topic in TOPICS if topic.qos.latched}  # sent once, for all who ever come
 
 
 class Head(msgspec.Struct, frozen=True):

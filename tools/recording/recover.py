@@ -7,8 +7,9 @@ from typing import Any
 from mcap.records import Attachment, Channel, Footer, Message, Metadata, Schema
 from mcap.writer import CompressionType, Writer
 
+from lira.hal.bus.topics import LATCHED_KEYS
 from lira.tools.recording.bag import BagFile, write_bag
-from lira.tools.recording.layout import BAG, LATCHED, PROFILE, files_of
+from lira.tools.recording.layout import BAG, PROFILE, files_of
 from lira.tools.recording.reader import Recording
 from lira.tools.recording.writer import CHUNK_BYTES
 
@@ -24,7 +25,7 @@ def recover(path: Path) -> Iterator[str]:
             _rewrite(each, records, recording.head.version)
         found = BagFile(each)
         for topic, ros_type, log_ns in _messages(Recording(each), each):
-            latched = topic.removeprefix(f"/{recording.head.robot}/") in LATCHED
+            latched = topic.removeprefix(f"/{recording.head.robot}/") in LATCHED_KEYS
             found.note(topic, ros_type, log_ns, latched=latched)
         bag.append(found)
         yield f"{each}: {'whole' if records is None else 'mended'}, {found.count} messages"

@@ -6,10 +6,9 @@ from pathlib import Path
 
 from lira.hal.bus.attachment import Attachment
 from lira.hal.bus.sensors import SENSORS
-from lira.hal.bus.topics import APPLIED, CLOCK, DECISION, SIM_STATE
+from lira.hal.bus.topics import APPLIED, CLOCK, DECISION, LATCHED_KEYS, SIM_STATE
 from lira.hal.errors import CodecError
 from lira.hal.messages import Call, Decision
-from lira.tools.recording.layout import LATCHED
 from lira.tools.recording.reader import Recorded, Recording
 
 # Their numbers are those of observations, of which not each brings something new, or commands.
@@ -82,7 +81,7 @@ class Summary:
     @property
     def duration_s(self) -> float:
         """From the first message to the last, on the robot's clock; those sent once, maybe long before, aside."""
-        firsts = [topic.first_s for topic in self.topics.values() if topic.key not in LATCHED]
+        firsts = [topic.first_s for topic in self.topics.values() if topic.key not in LATCHED_KEYS]
         return max((topic.last_s for topic in self.topics.values()), default=0.0) - min(firsts, default=0.0)
 
 

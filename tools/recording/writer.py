@@ -10,6 +10,7 @@ import msgspec
 from mcap.writer import CompressionType, Writer
 
 from lira.hal.bus.reader import RawSample
+from lira.hal.bus.topics import LATCHED_KEYS
 from lira.hal.errors import StorageError
 from lira.hal.messages.ros_types import TYPES, definition
 from lira.tools.recording.bag import BagFile, qos_text, write_bag
@@ -19,7 +20,6 @@ from lira.tools.recording.layout import (
     ENCODING,
     HEAD,
     INFO,
-    LATCHED,
     LOSSES,
     PROFILE,
     SCHEMA_ENCODING,
@@ -119,7 +119,7 @@ class RecordingWriter:
         topic = f"/{self._head.robot}/{key}"
         channel = self._channels.get((key, ros_type)) or self._channel(topic, key, ros_type)
         self._writer.add_message(channel, log_ns, payload, publish_ns, sequence % SEQUENCES)
-        self._now.note(topic, ros_type, log_ns, latched=key in LATCHED)
+        self._now.note(topic, ros_type, log_ns, latched=key in LATCHED_KEYS)
 
     def _channel(self, topic: str, key: str, ros_type: str) -> int:
         schema = self._schemas.get(ros_type)
@@ -128,7 +128,7 @@ class RecordingWriter:
             text = definition(ros_type).encode() if ros_type in TYPES.types else b""
             schema = self._writer.register_schema(ros_type, SCHEMA_ENCODING, text)
             self._schemas[ros_type] = schema
-        about = {"offered_qos_profiles": qos_text(latched=key in LATCHED)}
+        about = {"offered_qos_profiles": qos_text(latched=key in LATCHED_KEYS)}
         channel = self._writer.register_channel(topic, ENCODING, schema, about)
         self._channels[key, ros_type] = channel
         return channel

@@ -81,7 +81,7 @@ def run(args: argparse.Namespace) -> int:
 def laptop_plan(args: argparse.Namespace, target: "Target") -> "Plan":
     """What runs beside the robot. Raises `ConfigError` and `MissingExtraError`."""
     from lira.tools.deploy.plans import for_laptop
-    from lira.tools.lifecycle.arguments import Ports, check_method, check_packages, setup_of
+    from lira.tools.lifecycle.arguments import Ports, check_method, check_packages, check_policy, setup_of
 
     # A unit has a folder of its own: what is a file here keeps its whole path.
     for name in ("world", "profile", "policy"):
@@ -93,6 +93,7 @@ def laptop_plan(args: argparse.Namespace, target: "Target") -> "Plan":
     setup = setup_of(args, Ports())
     check_packages(setup)
     check_method(setup)
+    check_policy(setup)
     return for_laptop(setup, target.look(setup.name), sys.executable, Path.cwd(), args.keys)
 
 

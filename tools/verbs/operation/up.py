@@ -20,9 +20,7 @@ exit status: 0 when all of it runs, also if it did before; 1 if something else i
 
 import argparse
 import time
-from pathlib import Path
 
-from lira.hal.errors import ConfigError
 from lira.tools.lifecycle.arguments import add_setup
 
 
@@ -34,7 +32,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Bring it up, or say what is up already."""
-    from lira.tools.lifecycle.arguments import Ports, check_packages, setup_of
+    from lira.tools.lifecycle.arguments import Ports, check_packages, check_policy, setup_of
     from lira.tools.lifecycle.control import bring_up, supervise
     from lira.tools.lifecycle.ports import free_from
     from lira.tools.lifecycle.setup import PAGE_PORT, PORT
@@ -46,10 +44,9 @@ def run(args: argparse.Namespace) -> int:
         same = now == setup_of(args, Ports(int(now.endpoint.rpartition(":")[2]), now.page_port))
         print(f"already up{'' if same else ', as something else (lira down ends it)'}:\n\n{as_text(before)}")
         return 0 if same else 1
-    if (args.policy or "").endswith(".safetensors") and not Path(args.policy).is_file():
-        raise ConfigError(f"there is no novice {args.policy}", "Name novice.safetensors in the folder of a run.")
     setup = setup_of(args, Ports(free_from(PORT), free_from(PAGE_PORT)))
     check_packages(setup)
+    check_policy(setup)
     if args.stay:
         supervise(setup, say)
         return 0

@@ -12,7 +12,7 @@ examples:
 import argparse
 from pathlib import Path
 
-from lira.hal.errors import ConfigError, StorageError
+from lira.hal.errors import ConfigError
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -22,6 +22,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Write it."""
+    from lira.hal.config import write_whole
     from lira.hal.messages.ros_types import PACKAGE
     from lira.tools.cli import version
     from lira.tools.ros2.package import package_files
@@ -29,12 +30,7 @@ def run(args: argparse.Namespace) -> int:
     folder = args.out / PACKAGE
     if folder.exists() and not (folder / "package.xml").is_file():
         raise ConfigError(f"{folder} is there and is no ROS package", "Name another folder, or move that one away.")
-    try:
-        for name, text in package_files(version()).items():
-            path = folder / name
-            path.parent.mkdir(parents=True, exist_ok=True)
-            path.write_text(text, encoding="utf-8")
-    except OSError as error:
-        raise StorageError(f"cannot write {folder}: {error.strerror}", "Choose another folder.") from error
+    for name, text in package_files(version()).items():
+        write_whole(folder / name, text.encode(), folder=True)
     print(f"{folder}: build it with: colcon build --packages-select {PACKAGE}")
     return 0
