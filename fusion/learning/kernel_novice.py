@@ -14,6 +14,9 @@ from lira.fusion.policies.kernel import ANGULAR, KernelRidge, KernelSettings
 from lira.fusion.preprocess import Features
 from lira.hal.messages import Action, Driver
 
+ROUNDING = 1e-5  # of what a file holds in single precision: where it was proven it is not to doubt
+MOST_MET = 4096  # states that wait to be measured: 26 MB with 800 examples
+
 
 class KernelNovice(Novice):
     """Kernel ridge regression on what the experts' trunks see; `mirrored` learns left and right exchanged, too."""
@@ -28,7 +31,8 @@ class KernelNovice(Novice):
         self._mirrored = mirrored
         self._given: list[tuple[str, Action]] = []  # who gave each label, and what it says
         self._group = 0
-        self.limit = math.inf  # the largest deviation of its turn in the proving runs since the last label
+        self._limit = math.inf
+        self._met: list[Tensor] = []  # k [n] of states of its proving runs that `limit` does not know yet
         self.ridge = KernelRidge(dict(zip(sees.shapes, sees.trunk_sizes, strict=True)), settings)
 
     def act(self, features: Features) -> Action:
@@ -41,9 +45,17 @@ class KernelNovice(Novice):
 
     def proving(self, features: Features) -> Action:
         """The same. What it meets in the runs that prove it, it knows: the measure of its doubt afterwards."""
-        _, turn = self.deviation(features)
-        self.limit = turn if math.isinf(self.limit) else max(self.limit, turn)
+        self._met.append(self.ridge.k(self._x(features)))
+        if len(self._met) == MOST_MET:
+            self._measure_doubt()
         return self.alone(features)
+
+    @property
+    def limit(self) -> float:
+        """The largest deviation of its turn in the proving runs since the last label; infinite if it drove none."""
+        if self._met:
+            self._measure_doubt()
+        return self._limit
 
     def doubts(self, features: Features) -> bool:
         """Whether it knows less here than anywhere in the runs that proved it; never, if it drove none."""
@@ -69,7 +81,7 @@ class KernelNovice(Novice):
         self._given.append((label.source, label.action))
         self.stored += 1
         self.training_steps += 1
-        self.limit = math.inf
+        self._met, self._limit = [], math.inf
 
     def set_aside(self) -> list[Contradiction]:
         """Labels that contradict the rest, with what the others say there."""
@@ -103,9 +115,15 @@ class KernelNovice(Novice):
             "lengths": torch.tensor(self.ridge.lengths).numpy(),
             "scale": self.ridge.fit.scale.float().numpy(),
             "gain": torch.tensor([self.ridge.gain]).numpy(),
-            "limit": torch.tensor([min(self.limit, NEVER)]).numpy(),
+            "limit": torch.tensor([min((1.0 + ROUNDING) * self.limit, NEVER)]).numpy(),
         }
         return KernelNet(replace(self._network.architecture, examples=int(used.sum())), weights)
+
+    def _measure_doubt(self) -> None:
+        """Take in what it has met: all at once, and only when it matters, which for most laps is never."""
+        largest = float(self.ridge.fit.deviation(torch.stack(self._met))[:, ANGULAR].max())
+        self._limit = largest if math.isinf(self._limit) else max(self._limit, largest)
+        self._met = []
 
     def _x(self, features: Features) -> Tensor:
         """x [size] of one state."""

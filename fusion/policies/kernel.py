@@ -29,17 +29,20 @@ worst one leaves the fit, an expert's before a human's.
 
 Sources: Rasmussen & Williams, Gaussian Processes for Machine Learning (2006), eq. 2.25, 2.26 and section 5.4.2 (eq.
 5.10 to 5.12); leaving a group out: Hager (1989), Updating the Inverse of a Matrix. Appending a row or taking one out
-changes P by O(n^2) work, so it is done between two steps.
+changes P by O(n^2) work and in its place, so it is done between two steps.
 """
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
+import numpy as np
 import torch
 from torch import Tensor
-from torch.nn.functional import normalize, pad
+from torch.nn.functional import normalize
 
+from lira.fusion.inference import kernel_net
+from lira.fusion.policies.growing import Rows, Square
 from lira.hal.config import Table
 
 LINEAR, ANGULAR = 0, 1
@@ -64,36 +67,32 @@ def unit(features: Tensor, sizes: Sequence[int]) -> Tensor:
 
 def kernel(one: Tensor, other: Tensor, sizes: Sequence[int], lengths: Sequence[float]) -> Tensor:
     """k of all pairs, float64 [n, m], of states [n, size] and [m, size]; a size and a length scale for each part."""
-    exponent = torch.zeros(len(one), len(other), dtype=torch.float64)
-    parts = zip(torch.split(one, list(sizes), dim=1), torch.split(other, list(sizes), dim=1), lengths, strict=True)
-    for mine, theirs, length in parts:
-        exponent -= (1.0 - (mine @ theirs.T).double()) / length**2
-    return exponent.exp()
+    widths = np.square(lengths)
+    return torch.from_numpy(kernel_net.kernel(one.numpy(), other.numpy(), kernel_net.parts(sizes), widths))
 
 
 @dataclass(frozen=True)
 class Fit:
-    """The regression on some examples: P float64 [n, n] with zero rows for what is set aside, Y float64 [n, 2]."""
+    """The regression on some examples: P float64 [n, n] with zero rows for what is set aside, Y float64 [n, 2].
+
+    It looks at what the regression is kept in, and so is good until the next example.
+    """
 
     p: Tensor
     y: Tensor
+    a: Tensor  # A [n, 2]
     noise: Tensor  # the diagonal of N [n]
     used: Tensor  # bool [n]
     human: Tensor  # bool [n]
     groups: Tensor  # int64 [n]
 
-    @cached_property
-    def a(self) -> Tensor:
-        """A [n, 2]."""
-        return self.p @ self.y
-
     def mean(self, k: Tensor) -> Tensor:
-        """m before it is clipped [2], of the kernel values k [n] of one state."""
+        """m before it is clipped [..., 2], of the kernel values k [..., n] of some states."""
         return k @ self.a
 
     def deviation(self, k: Tensor) -> Tensor:
-        """sd [2]."""
-        variance: Tensor = 1.0 - k @ self.p @ k
+        """sd [..., 2]."""
+        variance = 1.0 - (k @ self.p * k).sum(dim=-1, keepdim=True)
         return self.scale * variance.clamp(min=0.0).sqrt()
 
     @cached_property
@@ -145,38 +144,76 @@ class KernelRidge:
         self._sizes = tuple(sizes.values())
         self.lengths = tuple(dict(settings.lengths).get(name, settings.length) for name in sizes)
         self._settings = settings
-        self.x = torch.empty(0, sum(self._sizes))  # float32 [n, size]
-        self.y = torch.empty(0, 2, dtype=torch.float64)
-        self.w = torch.empty(0, dtype=torch.float64)
-        self.human = torch.empty(0, dtype=torch.bool)
-        self.groups = torch.empty(0, dtype=torch.int64)
-        self.labels = torch.empty(0, dtype=torch.int64)  # which label each is an example of
-        self._p = torch.empty(0, 0, dtype=torch.float64)
+        self._x = Rows((sum(self._sizes),), torch.float32)
+        self._y = Rows((2,), torch.float64)
+        self._w = Rows((), torch.float64)
+        self._human = Rows((), torch.bool)
+        self._groups = Rows((), torch.int64)
+        self._labels = Rows((), torch.int64)
+        self._p = Square(torch.float64)
         self._fit: Fit | None = None
+        self._asked: tuple[Tensor, Tensor] | None = None  # x and k(x) of the last state
 
     def __len__(self) -> int:
-        return len(self.y)
+        return self._y.count
+
+    @property
+    def x(self) -> Tensor:
+        """Float32 [n, size]."""
+        return self._x.rows
+
+    @property
+    def y(self) -> Tensor:
+        """Y, float64 [n, 2]."""
+        return self._y.rows
+
+    @property
+    def w(self) -> Tensor:
+        """Weights, float64 [n]."""
+        return self._w.rows
+
+    @property
+    def human(self) -> Tensor:
+        """Whether a human gave it, bool [n]."""
+        return self._human.rows
+
+    @property
+    def groups(self) -> Tensor:
+        """Which group each belongs to, int64 [n]."""
+        return self._groups.rows
+
+    @property
+    def labels(self) -> Tensor:
+        """Which label each is an example of, int64 [n]."""
+        return self._labels.rows
 
     def k(self, x: Tensor) -> Tensor:
-        """Kernel values of one state x [size] with all examples, float64 [n]."""
-        return kernel(self.x, x[None], self._sizes, self.lengths)[:, 0]
+        """Kernel values of one state x [size] with all examples, float64 [n], or of several [m, size], [m, n].
+
+        Of the state that was asked about last they are known: a step asks for its action, its doubt and its label.
+        """
+        if x.dim() > 1:
+            return kernel(self.x, x, self._sizes, self.lengths).T
+        if self._asked is None or not torch.equal(x, self._asked[0]):
+            self._asked = x.clone(), kernel(self.x, x[None], self._sizes, self.lengths)[:, 0]
+        return self._asked[1]
 
     def add(
         self, x: Tensor, action: tuple[float, float], weight: float, *, human: bool, group: int, label: int
     ) -> None:
         """Append one example x [size] of a label: P is bordered (Schur complement). Of too many, one has to go."""
         k = self.k(x)
-        pk = self._p @ k
-        schur = 1.0 + self._settings.noise / weight - k @ pk
-        row = torch.cat([-pk, torch.ones(1, dtype=torch.float64)])
-        self._p = pad(self._p, (0, 1, 0, 1)) + torch.outer(row, row) / schur
-        self.x = torch.cat([self.x, x[None]])
-        self.y = torch.cat([self.y, torch.tensor([action], dtype=torch.float64)])
-        self.w = torch.cat([self.w, torch.tensor([weight], dtype=torch.float64)])
-        self.human = torch.cat([self.human, torch.tensor([human])])
-        self.groups = torch.cat([self.groups, torch.tensor([group])])
-        self.labels = torch.cat([self.labels, torch.tensor([label])])
-        self._fit = None
+        pk = self._p.values @ k
+        schur = 1.0 + self._settings.noise / weight - float(k @ pk)
+        self._p.values.addr_(pk, pk, alpha=1.0 / schur)
+        self._p.border(-pk / schur, 1.0 / schur)
+        self._x.append(x)
+        self._y.append(torch.tensor(action, dtype=torch.float64))
+        self._w.append(weight)
+        self._human.append(human)
+        self._groups.append(group)
+        self._labels.append(label)
+        self._fit = self._asked = None
         if len(self) > self._settings.most:
             self._forget()
 
@@ -185,11 +222,15 @@ class KernelRidge:
         """The regression without what contradicts the rest."""
         if self._fit is None:
             used = torch.ones(len(self), dtype=torch.bool)
-            p = self._p.clone()
-            while (worst := self._contradiction(p, used)) is not None:
+            p, y = self._p.values, self.y
+            a = p @ y
+            while (worst := self._contradiction(p, a, used)) is not None:
+                if p is self._p.values:
+                    p = p.clone()
                 leave_out(p, worst)
                 used[worst] = False
-            self._fit = Fit(p, self.y, self._settings.noise / self.w, used, self.human, self.groups)
+                a = p @ y
+            self._fit = Fit(p, y, a, self._settings.noise / self.w, used, self.human, self.groups)
         return self._fit
 
     @property
@@ -212,27 +253,26 @@ class KernelRidge:
         """g, or what is set instead of it."""
         return self.fit.gain if self._settings.gain is None else self._settings.gain
 
-    def _contradiction(self, p: Tensor, used: Tensor) -> int | None:
+    def _contradiction(self, p: Tensor, a: Tensor, used: Tensor) -> int | None:
         """The example that is to be set aside next."""
         limit = self._settings.contradicts
         if limit is None or not used.any():
             return None
-        residual = ((p @ self.y[:, ANGULAR]) / p.diagonal()).abs().where(used, 0.0)
+        residual = (a[:, ANGULAR] / p.diagonal()).abs().where(used, 0.0)
         experts = residual.where(~self.human, 0.0)
         worst = experts if float(experts.max()) > limit else residual
         return int(worst.argmax()) if float(worst.max()) > limit else None
 
     def _forget(self) -> None:
         """Let the example go that the others say best, an expert's if there is any: the log still has it."""
-        residual = ((self._p @ self.y) / self._p.diagonal()[:, None]).square().sum(dim=1)
+        p = self._p.values
+        residual = ((p @ self.y) / p.diagonal()[:, None]).square().sum(dim=1)
         if not self.human.all():
             residual = residual.where(~self.human, torch.inf)
         gone = int(residual.argmin())
-        stay = torch.arange(len(self)) != gone
-        leave_out(self._p, gone)
-        self._p = self._p[stay][:, stay]
-        self.x, self.y, self.w = self.x[stay], self.y[stay], self.w[stay]
-        self.human, self.groups, self.labels = self.human[stay], self.groups[stay], self.labels[stay]
+        leave_out(p, gone)
+        for kept in (self._p, self._x, self._y, self._w, self._human, self._groups, self._labels):
+            kept.remove(gone)
 
 
 def leave_out(p: Tensor, i: int) -> None:

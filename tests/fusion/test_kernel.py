@@ -92,6 +92,22 @@ def test_it_knows_what_it_was_shown_and_stands_where_it_was_shown_nothing():
     assert known < 0.1 * unknown
 
 
+def test_several_states_are_asked_about_at_once_as_one_by_one():
+    x, ridge = states(20), taught(states(12), actions(12))
+    at_once = ridge.k(x)
+    assert torch.allclose(at_once, torch.stack([ridge.k(each) for each in x]), rtol=0.0, atol=1e-5)
+    one_by_one = torch.stack([ridge.fit.deviation(ridge.k(each)) for each in x])
+    assert torch.allclose(ridge.fit.deviation(at_once), one_by_one, rtol=0.0, atol=1e-5)
+
+
+def test_what_is_known_of_a_state_is_forgotten_with_the_next_example():
+    x = states(3)
+    ridge = taught(x[:1], actions(1))
+    assert len(ridge.k(x[2])) == 1
+    ridge.add(x[1], (1.0, 0.0), 1.0, human=True, group=1, label=1)
+    assert torch.equal(ridge.k(x[2]), kernel(ridge.x, x[2:], BOTH, (0.4, 0.4))[:, 0])
+
+
 def test_before_any_label_it_stands():
     ridge = KernelRidge(SIZES, KernelSettings())
     assert ridge.act(states(1)[0], ridge.gain) == (0.0, 0.0)
