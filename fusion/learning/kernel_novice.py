@@ -1,6 +1,7 @@
 """The novice of `policies/kernel.py`: it learns from each label at once, and says how sure it is."""
 
 import math
+from collections.abc import Sequence
 from dataclasses import replace
 
 import torch
@@ -8,7 +9,7 @@ from torch import Tensor
 
 from lira.fusion.inference.kernel_net import NEVER, KernelNet
 from lira.fusion.learning.labels import Label, mirror
-from lira.fusion.learning.learned_policy import Contradiction, Part
+from lira.fusion.learning.learned_policy import Contradiction, Part, Together
 from lira.fusion.learning.novice import LearningSettings, Novice
 from lira.fusion.policies.kernel import ANGULAR, KernelRidge, KernelSettings
 from lira.fusion.preprocess import Features
@@ -32,7 +33,7 @@ class KernelNovice(Novice):
         self._given: list[tuple[str, Action]] = []  # who gave each label, and what it says
         self._group = 0
         self._limit = math.inf
-        self._met: list[Tensor] = []  # k [n] of states of its proving runs that `limit` does not know yet
+        self._met: list[Tensor] = []  # k [m, n] of states of its proving runs that `limit` does not know yet
         self.ridge = KernelRidge(dict(zip(sees.shapes, sees.trunk_sizes, strict=True)), settings)
 
     def act(self, features: Features) -> Action:
@@ -45,10 +46,19 @@ class KernelNovice(Novice):
 
     def proving(self, features: Features) -> Action:
         """The same. What it meets in the runs that prove it, it knows: the measure of its doubt afterwards."""
-        self._met.append(self.ridge.k(self._x(features)))
-        if len(self._met) == MOST_MET:
-            self._measure_doubt()
+        self._meet(self.ridge.k(self._x(features))[None])
         return self.alone(features)
+
+    def together(self, *, proving: bool) -> Together:
+        """m(x) of several states with the turn times g."""
+
+        def act(seen: Sequence[Features]) -> list[Action]:
+            k = self.ridge.k(torch.stack([self._x(each) for each in seen]))
+            if proving:
+                self._meet(k)
+            return self.ridge.actions(k, self.ridge.gain)
+
+        return act
 
     @property
     def limit(self) -> float:
@@ -119,9 +129,15 @@ class KernelNovice(Novice):
         }
         return KernelNet(replace(self._network.architecture, examples=int(used.sum())), weights)
 
+    def _meet(self, k: Tensor) -> None:
+        """Keep the kernel values [m, n] of states of a proving run."""
+        self._met.append(k)
+        if sum(map(len, self._met)) >= MOST_MET:
+            self._measure_doubt()
+
     def _measure_doubt(self) -> None:
         """Take in what it has met: all at once, and only when it matters, which for most laps is never."""
-        largest = float(self.ridge.fit.deviation(torch.stack(self._met))[:, ANGULAR].max())
+        largest = float(self.ridge.fit.deviation(torch.cat(self._met))[:, ANGULAR].max())
         self._limit = largest if math.isinf(self._limit) else max(self._limit, largest)
         self._met = []
 
