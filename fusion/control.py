@@ -64,6 +64,7 @@ class ControlLoop:
 
     def __init__(self, robot: Robot, truth: Callable[[], CourseState | None] | None = None) -> None:
         self._robot = robot
+        self._restartable = robot if isinstance(robot, Restartable) else None
         self._truth = truth
         self._base = robot.profile.base
         self._period_s = robot.profile.period_s
@@ -130,7 +131,7 @@ class ControlLoop:
 
         Raises `BusError` if another robot came in its place.
         """
-        return isinstance(self._robot, Restartable) and self._robot.started_anew()
+        return self._restartable is not None and self._restartable.started_anew()
 
     def stand(self) -> None:
         """Let one period pass without a decision: the robot stands, unless a hand drives it."""

@@ -33,7 +33,7 @@ class KernelNovice(Novice):
         self._given: list[tuple[str, Action]] = []  # who gave each label, and what it says
         self._group = 0
         self._limit = math.inf
-        self._met: list[Tensor] = []  # k [m, n] of states of its proving runs that `limit` does not know yet
+        self._met: list[Tensor] = []  # k [n] of states of its proving runs that `limit` does not know yet
         self.ridge = KernelRidge(dict(zip(sees.shapes, sees.trunk_sizes, strict=True)), settings)
 
     def act(self, features: Features) -> Action:
@@ -131,13 +131,13 @@ class KernelNovice(Novice):
 
     def _meet(self, k: Tensor) -> None:
         """Keep the kernel values [m, n] of states of a proving run."""
-        self._met.append(k)
-        if sum(map(len, self._met)) >= MOST_MET:
+        self._met.extend(k)
+        if len(self._met) >= MOST_MET:
             self._measure_doubt()
 
     def _measure_doubt(self) -> None:
         """Take in what it has met: all at once, and only when it matters, which for most laps is never."""
-        largest = float(self.ridge.fit.deviation(torch.cat(self._met))[:, ANGULAR].max())
+        largest = float(self.ridge.fit.deviation(torch.stack(self._met))[:, ANGULAR].max())
         self._limit = largest if math.isinf(self._limit) else max(self._limit, largest)
         self._met = []
 
