@@ -13,8 +13,7 @@ from lira.fusion.inference.architecture import Weights
 from lira.fusion.learning.adam import Adam
 from lira.fusion.learning.heads import Heads
 from lira.fusion.learning.label_store import FileRows, Rows
-from lira.fusion.learning.labels import Label as Label
-from lira.fusion.learning.labels import mirror
+from lira.fusion.learning.labels import Label, mirror
 from lira.fusion.policies.ensemble import EnsembleNet
 from lira.fusion.policies.networks import Inputs, Network, PictureTrunk, ScanTrunk, batch_of_one
 from lira.fusion.preprocess import MODALITIES

@@ -94,6 +94,11 @@ class Preset(msgspec.Struct, frozen=True):
         """Which approach it is, in one word."""
         return self.approach.kind
 
+    @property
+    def trains(self) -> bool:
+        """Whether its novice is a network, which torch trains; of a method of somebody's own nobody knows."""
+        return self.kernel is None and not isinstance(self.approach, OwnSettings | SwitchingSettings)
+
     def starting(self, who: str) -> "Preset":
         """Return the same with another driver before the first training step. Raises `ConfigError`."""
         return msgspec.structs.replace(self, approach=self.approach.starting(who))

@@ -90,9 +90,6 @@ class Outcome(msgspec.Struct, frozen=True):
 
 def play(trial: Trial) -> Outcome:
     """Run a trial in process, on one thread: its outcome does not depend on what runs beside it."""
-    import torch
-
-    torch.set_num_threads(1)
     one_thread()
     profile, world = trial.profile, load_world(trial.world)
     first = UNSEEN + trial.seed * trial.unseen

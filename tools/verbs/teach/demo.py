@@ -35,7 +35,8 @@ if TYPE_CHECKING:
     from lira.tools.launch.launch import Part
     from lira.tools.launch.processes import ChildProcess
 
-NEEDED = {"torch": "learn"}  # and the extras that bring it
+NEEDED = {"safetensors": "drive"}  # and the extra that brings it
+NEEDED_BY_NETWORKS = {"torch": "learn"}
 NEEDED_BY_WIRE = {"serial": "robot"}
 POLL_S = 0.1
 STALL_S = 60.0
@@ -72,6 +73,7 @@ def run(args: argparse.Namespace) -> int:
     """Run the demo from start to report."""
     from lira.fusion.experts.files import expert_path, experts_of
     from lira.fusion.experts.tasks import TASKS, task_of
+    from lira.fusion.methods.presets import method_named
     from lira.fusion.methods.syllabus import THESIS, with_proof
     from lira.hal.profile import load_profile
     from lira.sim_backend.catalogue import load_world
@@ -86,14 +88,17 @@ def run(args: argparse.Namespace) -> int:
     profile = load_profile(robot)
     for expert in experts_of(profile):
         expert_path(expert, profile, task)
-    for package, extra in {**NEEDED, **(NEEDED_BY_WIRE if args.wire else {})}.items():
+    trains = method_named(args.method).trains
+    for package, extra in {
+        **NEEDED,
+        **(NEEDED_BY_NETWORKS if trains else {}),
+        **(NEEDED_BY_WIRE if args.wire else {}),
+    }.items():
         if find_spec(package) is None:
             raise MissingExtraError(package, extra)
     with_proof(THESIS, args.proof)
     from lira.fusion.experts.load import load_policy  # not sooner: it takes the learner's libraries
-    from lira.fusion.methods.presets import method_named
 
-    method_named(args.method)
     for expert in args.expert:
         load_policy(expert, profile)
     folder: Path = args.run or Path("runs") / f"demo-{datetime.now():%Y%m%d-%H%M%S}"
