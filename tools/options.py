@@ -20,6 +20,14 @@ def natural(text: str) -> int:
     return value
 
 
+def positive(text: str) -> int:
+    """Read a whole number from 1 on: how many of something there shall be."""
+    value = int(text) if text.isdecimal() else 0
+    if value < 1:
+        raise argparse.ArgumentTypeError(f"'{text}' is not a whole number from 1 on")
+    return value
+
+
 def port(text: str) -> int:
     """Read a port to serve on; 0 is any that is free."""
     if not text.isdecimal() or not 0 <= int(text) < 65536:

@@ -47,6 +47,14 @@ def test_who_reaches_the_lowest_level_is_tried_in_every_way_and_once_more_after_
     assert not outcome.tracks
 
 
+def test_a_higher_cap_of_laps_shows_more_of_who_is_not_there_yet_and_changes_nothing_else(outcome):
+    trial = msgspec.structs.replace(outcome.trial, quality=msgspec.structs.replace(TO, ways=("plain",), more=0))
+    low, high = (play(msgspec.structs.replace(trial, laps=laps)) for laps in (1, 2))
+    assert high.points[: len(low.points)] == low.points == outcome.points[:1]
+    assert high.judged[: len(low.judged)] == low.judged
+    assert (len(high.points) == 1) == low.result.converged
+
+
 PROFILE = load_profile("thesis-sim")
 WORLD = load_world("line-obstacles")
 
