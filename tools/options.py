@@ -77,6 +77,15 @@ def add_layout(parser: argparse.ArgumentParser, what: str) -> None:
     parser.add_argument("--layout", type=natural, default=0, help=f"{what} {DEFAULT}")
 
 
+def add_randomise(parser: argparse.ArgumentParser, where: str = "") -> None:
+    """Declare `--randomise`; `where` that happens."""
+    parser.add_argument(
+        "--randomise",
+        action="store_true",
+        help=f"{where}each layout with its own grays, noise, mounting of the camera and slip of the wheels",
+    )
+
+
 def add_seed(parser: argparse.ArgumentParser, what: str) -> None:
     """Declare `--seed`; `what` it decides."""
     parser.add_argument("--seed", type=natural, default=0, help=f"{what} {DEFAULT}")

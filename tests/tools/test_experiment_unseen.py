@@ -160,6 +160,7 @@ def test_where_by_whom_and_with_whose_experts_can_be_chosen():
         world="race",
         teacher="unskilled",
         shift="gray",
+        randomised=True,
         laps=20,
         more=5,
         ways=("plain", "ask"),
@@ -174,8 +175,10 @@ def test_where_by_whom_and_with_whose_experts_can_be_chosen():
     }
     assert asked.command == (
         "--seeds 2 --methods plus --first-seed 300 --experts line@1,line@2 --world race --teacher unskilled "
-        "--shift gray --laps 20 --more 5 --ways plain,ask"
+        "--shift gray --randomise --laps 20 --more 5 --ways plain,ask"
     )
+    assert all(each.quality.randomised for each in trials)
+    assert asked.elsewhere == "-race-unskilled-randomised-gray-more5"
     assert len({each.file for each in trials}) == 4
 
 
@@ -198,7 +201,7 @@ def test_the_cap_of_laps_is_stated_and_no_run_drives_layouts_of_another():
     for selection in (Selection(1, laps=most, more=1), Selection(1, more=most)):
         with pytest.raises(ConfigError, match="more are more than there are fresh layouts for"):
             selection.trials(load("unseen"), "unseen")
-    with pytest.raises(ConfigError, match="takes no --world, --teacher, --shift, --laps"):
+    with pytest.raises(ConfigError, match="takes no --world, --teacher, --shift, --randomise, --laps"):
         Selection(1, laps=6).trials(load("table2"), "table2")
 
 

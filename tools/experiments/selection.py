@@ -9,9 +9,9 @@ from msgspec.structs import replace
 from lira.fusion.methods.presets import method_named
 from lira.fusion.teaching.teacher import TEACHERS
 from lira.hal.errors import ConfigError
+from lira.sim_backend.shifts import SHIFTS
 from lira.tools.experiments.experiment import Experiment
 from lira.tools.experiments.quality import WAYS, Way
-from lira.tools.experiments.shifts import SHIFTS
 from lira.tools.experiments.trial import Trial
 
 ALL = "all"
@@ -21,8 +21,8 @@ ALL = "all"
 class Selection:
     """What is asked for. `methods` is a list with commas, "all", or None for the usual ones; `own` are a user's own.
 
-    `pairs` of experts replace the world's; `world`, `teacher`, `shift`, the cap of `laps`, `more` laps and `ways` of
-    deployment go with experiments at equal quality.
+    `pairs` of experts replace the world's; `world`, `teacher`, `shift`, whether the world is `randomised` while it is
+    taught, the cap of `laps`, `more` laps and `ways` of deployment go with experiments at equal quality.
     """
 
     seeds: int
@@ -33,6 +33,7 @@ class Selection:
     world: str | None = None
     teacher: str | None = None
     shift: str | None = None
+    randomised: bool = False
     laps: int | None = None
     more: int = 0
     ways: Sequence[Way] = ()
@@ -66,6 +67,7 @@ class Selection:
         words += [f"--world {self.world}"] if self.world is not None else []
         words += [f"--teacher {self.teacher}"] if self.teacher is not None else []
         words += [f"--shift {self.shift}"] if self.shift is not None else []
+        words += ["--randomise"] if self.randomised else []
         words += [f"--laps {self.laps}"] if self.laps is not None else []
         words += [f"--more {self.more}"] if self.more else []
         words += [f"--ways {','.join(self.ways)}"] if self.ways else []
@@ -77,17 +79,18 @@ class Selection:
         parts = (
             self.world and Path(self.world).stem,
             self.teacher,
+            "randomised" if self.randomised else None,
             self.shift,
             f"more{self.more}" if self.more else None,
         )
         return "".join(f"-{part}" for part in parts if part)
 
     def _elsewhere(self, trial: Trial, name: str) -> Trial:
-        asked = (self.world, self.teacher, self.shift, self.laps, self.more or None, self.ways or None)
-        if all(each is None for each in asked):
+        asked = (self.world, self.teacher, self.shift, self.randomised, self.laps, self.more, self.ways)
+        if not any(asked):
             return trial
         if trial.quality is None:
-            what = f"{name} takes no --world, --teacher, --shift, --laps, --more or --ways"
+            what = f"{name} takes no --world, --teacher, --shift, --randomise, --laps, --more or --ways"
             raise ConfigError(what, "They go with 'unseen' and other experiments at equal quality.")
         teacher = self.teacher or trial.teacher
         if teacher not in TEACHERS or (self.shift is not None and self.shift not in SHIFTS):
@@ -106,7 +109,7 @@ class Selection:
             teacher=teacher,
             skill=TEACHERS[teacher],
             laps=laps,
-            quality=replace(trial.quality, shift=self.shift, more=self.more, ways=ways),
+            quality=replace(trial.quality, shift=self.shift, more=self.more, ways=ways, randomised=self.randomised),
         )
 
 

@@ -95,6 +95,8 @@ def play(trial: Trial) -> Outcome:
     torch.set_num_threads(1)
     one_thread()
     profile, world = trial.profile, load_world(trial.world)
+    if trial.quality is not None and trial.quality.randomised:
+        world = msgspec.structs.replace(world, randomised=True)
     first = UNSEEN + trial.seed * trial.unseen
     layouts = range(first, first + trial.unseen)
     course = Course(

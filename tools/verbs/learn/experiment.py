@@ -24,7 +24,7 @@ from typing import TYPE_CHECKING
 
 from lira.hal.errors import ConfigError
 from lira.tools.experiments.registry import REGISTRY, load, words_of
-from lira.tools.options import add_json, natural, positive
+from lira.tools.options import add_json, add_randomise, natural, positive
 
 if TYPE_CHECKING:
     from lira.tools.experiments.output.summary import Summary
@@ -66,6 +66,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="of unseen: what is other where the novice is tried than where it was taught: gray, boxes, curvature, "
         "noise, camera or slip",
     )
+    add_randomise(parser, "of unseen: while it is taught, ")
     add("--ways", help="of unseen: how novices are tried: plain, field, shield, ask (default: plain,shield)")
     add("--laps", type=positive, help="of unseen: who is no better after so many laps is censored (default: 12)")
     add("--more", type=natural, default=0, help="of unseen: teach on for so many laps, to see whether that spoils it")
@@ -121,6 +122,7 @@ def play(args: argparse.Namespace, name: str) -> "tuple[Summary, Path]":
         world=args.world,
         teacher=args.teacher,
         shift=args.shift,
+        randomised=args.randomise,
         laps=args.laps,
         more=args.more,
         ways=tuple(args.ways.split(",")) if args.ways else (),
