@@ -11,6 +11,7 @@ examples:
   lira demo --world passage
   lira demo --method hold --proof own --layouts own      as in the thesis
   lira demo --expert mylab.experts:wall      a third expert, of your own
+  lira demo --world corridor --randomise     for a robot elsewhere: see `lira twin --wire`, `lira robot`, `lira drive`
   lira demo --wire        the drivers of the real robot in between, byte by byte; in real time
 
 exit status: 0 if the novice was proven within its laps and then passed every unseen layout, without a collision and
@@ -29,7 +30,7 @@ from typing import TYPE_CHECKING
 
 from lira.hal.errors import ConfigError, MissingExtraError
 from lira.hal.messages import Phase
-from lira.tools.options import add_expert, add_layout, add_protocol, add_record, add_seed, natural
+from lira.tools.options import add_expert, add_layout, add_protocol, add_randomise, add_record, add_seed, natural
 
 if TYPE_CHECKING:
     from lira.tools.launch.launch import Part
@@ -65,6 +66,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         choices=("sketch", "tiny", "egl"),
         help="what draws and measures the world, as in `lira twin` (default: sketch, if there is no mesh in it)",
     )
+    add_randomise(parser)
     add_record(parser)
     add("--run", type=Path, metavar="DIR", help="folder of the run (default: runs/demo-<date-time>)")
 
@@ -105,7 +107,8 @@ def run(args: argparse.Namespace) -> int:
     port = free_port()
     name, endpoint = f"demo_{port}", f"127.0.0.1:{port}"
     both = ["--layout", str(args.layout), "--seed", str(args.seed)]
-    twin = [*twin_words(world, robot, args.seed, args.renderer), "--layout", str(args.layout)]
+    twin = twin_words(world, robot, args.seed, args.renderer, randomise=args.randomise)
+    twin += ["--layout", str(args.layout)]
     fusion = [*both, "--name", name, "--connect", endpoint, "--method", args.method, "--teacher", "scripted"]
     fusion += ["--run", str(folder), "--train-laps", str(args.laps), "--unseen", str(args.unseen)]
     fusion += ["--layouts", args.layouts, "--proof", args.proof]
