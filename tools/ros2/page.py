@@ -8,7 +8,7 @@ from lira.tools.ros2.sight import Found, Place, lacking, sort, words
 
 NOTHING = "nothing comes there, and nobody says that they are there"
 IN_THE_WAY = (
-    "Is its ROS running, and is the domain (ROS_DOMAIN_ID) or the bridge's configuration (allow, deny) in the way?"
+    "Is its ROS running? Or is the domain (ROS_DOMAIN_ID) or the bridge's configuration (allow, deny) in the way?"
 )
 SILENT = "nothing came on any of these topics: is the driver of the robot's sensors running?"
 

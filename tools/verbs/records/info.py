@@ -1,7 +1,7 @@
 """Say what a recording holds: of which robot, how long, which topics and how often, what was lost, who drove.
 
-Lost is what was sent and never came to the recorder, by the numbers that senders give; "-" where those do not tell. What
-is latched is sent once, and told to all who ever come.
+Lost is what was sent and never came to the recorder, by the numbers that senders give; "-" where those do not tell.
+What is latched is sent once, and told to all who ever come.
 
 examples:
   lira info runs/demo-20261127-101500
