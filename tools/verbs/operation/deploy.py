@@ -100,7 +100,7 @@ def laptop_plan(args: argparse.Namespace, target: "Target") -> tuple["Plan", "Fa
     with suppress(MissingExtraError, ModuleNotFoundError) if args.dry_run else nullcontext():
         check_packages(setup)
         check_method(setup)
-    check_policy(setup)
+        check_policy(setup)
     facts = target.suppose(setup.name) if args.dry_run else target.look(setup.name)
     return for_laptop(setup, facts, sys.executable, Path.cwd(), args.keys), facts
 
