@@ -76,7 +76,6 @@ def run(args: argparse.Namespace) -> int:
     from lira.fusion.experts.files import expert_path, experts_of
     from lira.fusion.experts.tasks import TASKS, task_of
     from lira.fusion.methods.presets import method_named
-    from lira.fusion.methods.syllabus import THESIS, with_proof
     from lira.hal.profile import load_profile
     from lira.sim_backend.catalogue import load_world
     from lira.tools.launch.launch import direct, twin_words, wired
@@ -90,15 +89,14 @@ def run(args: argparse.Namespace) -> int:
     profile = load_profile(robot)
     for expert in experts_of(profile):
         expert_path(expert, profile, task)
-    trains = method_named(args.method).trains
+    preset = method_named(args.method).taught(layouts=args.layouts, proof=args.proof)
     for package, extra in {
         **NEEDED,
-        **(NEEDED_BY_NETWORKS if trains else {}),
+        **(NEEDED_BY_NETWORKS if preset.trains else {}),
         **(NEEDED_BY_WIRE if args.wire else {}),
     }.items():
         if find_spec(package) is None:
             raise MissingExtraError(package, extra)
-    with_proof(THESIS, args.proof)
     from lira.fusion.experts.load import load_policy  # not sooner: it takes the learner's libraries
 
     for expert in args.expert:
@@ -130,8 +128,10 @@ def supervise(parts: Sequence["Part"], fusion_command: list[str], folder: Path) 
 
     Raises `ProcessError` when one of them dies.
     """
+    from lira.tools.output.places import check_folder
     from lira.tools.report import RECORD
 
+    check_folder(folder)
     if (folder / RECORD).exists():
         raise ConfigError(f"{folder} already holds a run", "Choose another folder with --run.")
     try:

@@ -118,19 +118,19 @@ def run(args: argparse.Namespace) -> int:
 
 def plan_of(args: argparse.Namespace) -> "Plan":
     """What is taught, and how. Raises `ConfigError` for what cannot be, before anything starts."""
-    import msgspec
-
+    from lira.fusion.experts.load import check_named
     from lira.fusion.methods.presets import method_named
-    from lira.fusion.methods.syllabus import THESIS
+    from lira.tools.output.places import check_folder
     from lira.tools.runs.plan import Plan
 
+    check_folder(args.run)
+    check_named(args.expert, args.experts)
     preset = method_named(args.method)
     if not preset.approach.learns:
         raise ConfigError(f"by the method '{args.method}' nobody learns", "Choose another --method.")
-    learning = msgspec.structs.replace(preset.learning, idle_frames=args.idle_frames)
     return Plan(
         # A person learns one course by heart; what the novice has not seen comes in the proof.
-        msgspec.structs.replace(preset, learning=learning, syllabus=THESIS),
+        preset.taught(layouts="own", proof="own", idle_frames=args.idle_frames),
         layout=args.layout,
         seed=args.seed,
         laps=args.laps,
