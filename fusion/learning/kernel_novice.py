@@ -4,18 +4,17 @@ import math
 from collections.abc import Sequence
 from dataclasses import replace
 
-import torch
-from torch import Tensor
+import numpy as np
 
-from lira.fusion.inference.kernel_net import NEVER, KernelNet
+from lira.fusion.inference.kernel_net import NEVER, Doubles, KernelNet
 from lira.fusion.learning.labels import Label, mirror
 from lira.fusion.learning.learned_policy import Contradiction, Part, Together
 from lira.fusion.learning.novice import LearningSettings, Novice
 from lira.fusion.policies.kernel import ANGULAR, KernelRidge, KernelSettings
 from lira.fusion.preprocess import Features
-from lira.hal.messages import Action, Driver
+from lira.hal.messages import Action, Driver, FloatArray
 
-ROUNDING = 1e-5  # of what a file holds in single precision: where it was proven it is not to doubt
+ROUNDING = 1e-4  # of what a file holds in single precision: where it was proven it is not to doubt
 MOST_MET = 4096  # states that wait to be measured: 26 MB with 800 examples
 
 
@@ -33,7 +32,7 @@ class KernelNovice(Novice):
         self._given: list[tuple[str, Action]] = []  # who gave each label, and what it says
         self._group = 0
         self._limit = math.inf
-        self._met: list[Tensor] = []  # k [n] of states of its proving runs that `limit` does not know yet
+        self._met: list[Doubles] = []  # k [n] of states of its proving runs that `limit` does not know yet
         self.ridge = KernelRidge(dict(zip(sees.shapes, sees.trunk_sizes, strict=True)), settings)
 
     def act(self, features: Features) -> Action:
@@ -110,7 +109,7 @@ class KernelNovice(Novice):
         parts = []
         for number in sorted(set(self.ridge.labels.tolist())):
             of_label = self.ridge.labels == number
-            linear, angular = shares[of_label].sum(dim=0).tolist()
+            linear, angular = shares[of_label].sum(axis=0).tolist()
             source, action = self._given[number]
             parts.append(Part(number, source, action, (linear, angular), float(likeness[of_label].max())))
         return sorted(parts, key=lambda part: -max(map(abs, part.share)))
@@ -119,13 +118,13 @@ class KernelNovice(Novice):
         """Return the network that drives alone: without what was set aside."""
         used, settings = self.ridge.fit.used, self._settings
         weights = self._network.weights() | {
-            "x": self.ridge.x[used].numpy(),
-            "y": self.ridge.y[used].float().numpy(),
-            "noise": (settings.noise / self.ridge.w[used]).float().numpy(),
-            "lengths": torch.tensor(self.ridge.lengths).numpy(),
-            "scale": self.ridge.fit.scale.float().numpy(),
-            "gain": torch.tensor([self.ridge.gain]).numpy(),
-            "limit": torch.tensor([min((1.0 + ROUNDING) * self.limit, NEVER)]).numpy(),
+            "x": self.ridge.x[used],
+            "y": self.ridge.y[used].astype(np.float32),
+            "noise": (settings.noise / self.ridge.w[used]).astype(np.float32),
+            "lengths": self.ridge.lengths.astype(np.float32),
+            "scale": self.ridge.fit.scale.astype(np.float32),
+            "gain": np.array([self.ridge.gain], np.float32),
+            "limit": np.array([min((1.0 + ROUNDING) * self.limit, NEVER)], np.float32),
         }
         return KernelNet(replace(self._network.architecture, examples=int(used.sum())), weights)
 
@@ -137,10 +136,10 @@ class KernelNovice(Novice):
 
     def _measure_doubt(self) -> None:
         """Take in what it has met: all at once, and only when it matters, which for most laps is never."""
-        largest = float(self.ridge.fit.deviation(torch.stack(self._met))[:, ANGULAR].max())
+        largest = float(self.ridge.fit.deviation(np.stack(self._met))[:, ANGULAR].max())
         self._limit = largest if math.isinf(self._limit) else max(self._limit, largest)
         self._met = []
 
-    def _x(self, features: Features) -> Tensor:
+    def _x(self, features: Features) -> FloatArray:
         """x [size] of one state."""
-        return torch.from_numpy(self._network.see(features))
+        return self._network.see(features)

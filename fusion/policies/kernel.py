@@ -30,23 +30,27 @@ worst one leaves the fit, an expert's before a human's.
 Sources: Rasmussen & Williams, Gaussian Processes for Machine Learning (2006), eq. 2.25, 2.26 and section 5.4.2 (eq.
 5.10 to 5.12); leaving a group out: Hager (1989), Updating the Inverse of a Matrix. Appending a row or taking one out
 changes P by O(n^2) work and in its place, so it is done between two steps.
+
+k itself, and the novice as it drives when nobody teaches it any more, are in `inference/kernel_net.py`.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-import torch
-from torch import Tensor
-from torch.nn.functional import normalize
+from numpy.typing import NDArray
 
-from lira.fusion.inference import kernel_net
+from lira.fusion.inference.kernel_net import Doubles, kernel, parts
 from lira.fusion.policies.growing import Rows, Square
 from lira.hal.config import Table
+from lira.hal.messages import FloatArray
 
 LINEAR, ANGULAR = 0, 1
 GAINS = (1.0, 1.7)  # bounds of g: few interventions tell little of it, and beyond this nothing was gained
+
+Flags = NDArray[np.bool_]
+Numbers = NDArray[np.int64]
 
 
 class KernelSettings(Table, frozen=True):
@@ -60,68 +64,60 @@ class KernelSettings(Table, frozen=True):
     most: int = 800
 
 
-def unit(features: Tensor, sizes: Sequence[int]) -> Tensor:
-    """x [n, size] of the trunks' outputs [n, size], parts of these sizes: each is scaled to length 1."""
-    return torch.cat([normalize(part) for part in torch.split(features, list(sizes), dim=1)], dim=1)
-
-
-def kernel(one: Tensor, other: Tensor, sizes: Sequence[int], lengths: Sequence[float]) -> Tensor:
-    """k of all pairs, float64 [n, m], of states [n, size] and [m, size]; a size and a length scale for each part."""
-    widths = np.square(lengths)
-    return torch.from_numpy(kernel_net.kernel(one.numpy(), other.numpy(), kernel_net.parts(sizes), widths))
-
-
 @dataclass(frozen=True)
 class Fit:
-    """The regression on some examples: P float64 [n, n] with zero rows for what is set aside, Y float64 [n, 2].
+    """The regression on some examples: P [n, n] with zero rows for what is set aside, Y [n, 2], both float64.
 
     It looks at what the regression is kept in, and so is good until the next example.
     """
 
-    p: Tensor
-    y: Tensor
-    a: Tensor  # A [n, 2]
-    noise: Tensor  # the diagonal of N [n]
-    used: Tensor  # bool [n]
-    human: Tensor  # bool [n]
-    groups: Tensor  # int64 [n]
+    p: Doubles
+    y: Doubles
+    a: Doubles  # A [n, 2]
+    noise: Doubles  # the diagonal of N [n]
+    used: Flags  # [n]
+    human: Flags  # [n]
+    groups: Numbers  # [n]
 
-    def mean(self, k: Tensor) -> Tensor:
+    def mean(self, k: Doubles) -> Doubles:
         """m before it is clipped [..., 2], of the kernel values k [..., n] of some states."""
-        return k @ self.a
+        product: Doubles = k @ self.a
+        return product
 
-    def deviation(self, k: Tensor) -> Tensor:
+    def deviation(self, k: Doubles) -> Doubles:
         """sd [..., 2]."""
-        variance = 1.0 - (k @ self.p * k).sum(dim=-1, keepdim=True)
-        return self.scale * variance.clamp(min=0.0).sqrt()
+        variance = 1.0 - (k @ self.p * k).sum(axis=-1, keepdims=True)
+        sd: Doubles = self.scale * np.sqrt(np.maximum(0.0, variance))
+        return sd
 
     @cached_property
-    def left_out(self) -> tuple[Tensor, Tensor]:
+    def left_out(self) -> tuple[Doubles, Doubles]:
         """Of each example in use, by the other groups alone: residual [n, 2] and predicted variance [n]; else nan."""
-        residual, variance = torch.full_like(self.y, torch.nan), torch.full_like(self.y[:, 0], torch.nan)
-        for group in sorted(set(self.groups[self.used].tolist())):
-            members = torch.nonzero(self.used & (self.groups == group))[:, 0]
-            covariance = torch.linalg.inv(self.p[members][:, members])
+        residual, variance = np.full_like(self.y, np.nan), np.full(len(self.y), np.nan)
+        for group in np.unique(self.groups[self.used]):
+            members = np.flatnonzero(self.used & (self.groups == group))
+            covariance = np.linalg.inv(self.p[np.ix_(members, members)])
             residual[members] = covariance @ self.a[members]
             variance[members] = covariance.diagonal()
         return residual, variance
 
     @cached_property
-    def scale(self) -> Tensor:
+    def scale(self) -> Doubles:
         """s [2]; 1 where there is nothing to tell it by."""
         residual, variance = self.left_out
         if not self.used.any():
-            return torch.ones(2, dtype=torch.float64)
-        return (residual.square() / variance[:, None])[self.used].mean(dim=0).sqrt()
+            return np.ones(2)
+        s: Doubles = np.sqrt((residual**2 / variance[:, None])[self.used].mean(axis=0))
+        return s
 
     @cached_property
     def gain(self) -> float:
         """g."""
         shown = self.used & self.human
         turns = self.y[shown, ANGULAR]
-        predicted = (turns - self.left_out[0][shown, ANGULAR]).clamp(-1.0, 1.0)
+        predicted = np.clip(turns - self.left_out[0][shown, ANGULAR], -1.0, 1.0)
         low, high = GAINS
-        small, large = float(predicted.square().sum()), float(turns.square().sum())
+        small, large = float(predicted @ predicted), float(turns @ turns)
         return low if small == 0.0 else min(high, max(low, (large / small) ** 0.5))
 
     def surprise(self, share: float) -> float:
@@ -132,8 +128,8 @@ class Fit:
         shown = self.used & self.human
         if not shown.any():
             return 0.0
-        variance = (self.left_out[1] - self.noise)[shown].clamp(min=0.0)
-        return float(self.scale[ANGULAR] * variance.quantile(share).sqrt())
+        variance = np.maximum(0.0, (self.left_out[1] - self.noise)[shown])
+        return float(self.scale[ANGULAR] * np.sqrt(np.quantile(variance, share)))
 
 
 class KernelRidge:
@@ -141,74 +137,75 @@ class KernelRidge:
 
     def __init__(self, sizes: Mapping[str, int], settings: KernelSettings) -> None:
         """`sizes` of the parts of x, in order, by the names of the features that they come from."""
-        self._sizes = tuple(sizes.values())
-        self.lengths = tuple(dict(settings.lengths).get(name, settings.length) for name in sizes)
+        self._parts = parts(tuple(sizes.values()))
+        self.lengths = np.array([dict(settings.lengths).get(name, settings.length) for name in sizes])
         self._settings = settings
-        self._x = Rows((sum(self._sizes),), torch.float32)
-        self._y = Rows((2,), torch.float64)
-        self._w = Rows((), torch.float64)
-        self._human = Rows((), torch.bool)
-        self._groups = Rows((), torch.int64)
-        self._labels = Rows((), torch.int64)
-        self._p = Square(torch.float64)
+        self._x = Rows((sum(sizes.values()),), np.float32)
+        self._y = Rows((2,), np.float64)
+        self._w = Rows((), np.float64)
+        self._human = Rows((), np.bool_)
+        self._groups = Rows((), np.int64)
+        self._labels = Rows((), np.int64)
+        self._p = Square()
         self._fit: Fit | None = None
-        self._asked: tuple[Tensor, Tensor] | None = None  # x and k(x) of the last state
+        self._asked: tuple[FloatArray, Doubles] | None = None  # x and k(x) of the last state
 
     def __len__(self) -> int:
         return self._y.count
 
     @property
-    def x(self) -> Tensor:
+    def x(self) -> FloatArray:
         """Float32 [n, size]."""
         return self._x.rows
 
     @property
-    def y(self) -> Tensor:
+    def y(self) -> Doubles:
         """Y, float64 [n, 2]."""
         return self._y.rows
 
     @property
-    def w(self) -> Tensor:
+    def w(self) -> Doubles:
         """Weights, float64 [n]."""
         return self._w.rows
 
     @property
-    def human(self) -> Tensor:
-        """Whether a human gave it, bool [n]."""
+    def human(self) -> Flags:
+        """Whether a human gave it [n]."""
         return self._human.rows
 
     @property
-    def groups(self) -> Tensor:
-        """Which group each belongs to, int64 [n]."""
+    def groups(self) -> Numbers:
+        """Which group each belongs to [n]."""
         return self._groups.rows
 
     @property
-    def labels(self) -> Tensor:
-        """Which label each is an example of, int64 [n]."""
+    def labels(self) -> Numbers:
+        """Which label each is an example of [n]."""
         return self._labels.rows
 
-    def k(self, x: Tensor) -> Tensor:
+    def k(self, x: FloatArray) -> Doubles:
         """Kernel values of one state x [size] with all examples, float64 [n], or of several [m, size], [m, n].
 
         Of the state that was asked about last they are known: a step asks for its action, its doubt and its label.
         """
-        if x.dim() > 1:
-            return kernel(self.x, x, self._sizes, self.lengths).T
-        if self._asked is None or not torch.equal(x, self._asked[0]):
-            self._asked = x.clone(), kernel(self.x, x[None], self._sizes, self.lengths)[:, 0]
+        if x.ndim > 1:
+            return kernel(self.x, x, self._parts, self.lengths**2).T
+        if self._asked is None or not np.array_equal(x, self._asked[0]):
+            self._asked = x.copy(), kernel(self.x, x[None], self._parts, self.lengths**2)[:, 0]
         return self._asked[1]
 
     def add(
-        self, x: Tensor, action: tuple[float, float], weight: float, *, human: bool, group: int, label: int
+        self, x: FloatArray, action: tuple[float, float], weight: float, *, human: bool, group: int, label: int
     ) -> None:
         """Append one example x [size] of a label: P is bordered (Schur complement). Of too many, one has to go."""
         k = self.k(x)
-        pk = self._p.values @ k
+        p = self._p.values
+        pk = p @ k
         schur = 1.0 + self._settings.noise / weight - float(k @ pk)
-        self._p.values.addr_(pk, pk, alpha=1.0 / schur)
+        p += np.outer(pk, pk) / schur
         self._p.border(-pk / schur, 1.0 / schur)
         self._x.append(x)
-        self._y.append(torch.tensor(action, dtype=torch.float64))
+        self._y.append(action)
         self._w.append(weight)
         self._human.append(human)
         self._groups.append(group)
@@ -221,12 +218,12 @@ class KernelRidge:
     def fit(self) -> Fit:
         """The regression without what contradicts the rest."""
         if self._fit is None:
-            used = torch.ones(len(self), dtype=torch.bool)
+            used = np.ones(len(self), np.bool_)
             p, y = self._p.values, self.y
             a = p @ y
             while (worst := self._contradiction(p, a, used)) is not None:
                 if p is self._p.values:
-                    p = p.clone()
+                    p = p.copy()
                 leave_out(p, worst)
                 used[worst] = False
                 a = p @ y
@@ -236,14 +233,14 @@ class KernelRidge:
     @property
     def aside(self) -> dict[int, int]:
         """The labels of which an example is set aside, and the first such example of each."""
-        examples = torch.nonzero(~self.fit.used)[:, 0].flip(0)
+        examples = np.flatnonzero(~self.fit.used)[::-1]
         return dict(sorted((int(self.labels[i]), int(i)) for i in examples))
 
-    def shares(self, x: Tensor) -> Tensor:
+    def shares(self, x: FloatArray) -> Doubles:
         """What each example adds to m(x) [n, 2]: m(x) = w(x)^T Y with w(x) = P k(x)."""
         return (self.fit.p @ self.k(x))[:, None] * self.y
 
-    def act(self, x: Tensor, gain: float = 1.0) -> tuple[float, float]:
+    def act(self, x: FloatArray, gain: float = 1.0) -> tuple[float, float]:
         """m(x), the turn times `gain`, clipped."""
         (action,) = self.actions(self.k(x)[None], gain)
         return action
@@ -257,32 +254,33 @@ class KernelRidge:
         """g, or what is set instead of it."""
         return self.fit.gain if self._settings.gain is None else self._settings.gain
 
-    def _contradiction(self, p: Tensor, a: Tensor, used: Tensor) -> int | None:
+    def _contradiction(self, p: Doubles, a: Doubles, used: Flags) -> int | None:
         """The example that is to be set aside next."""
         limit = self._settings.contradicts
         if limit is None or not used.any():
             return None
-        residual = (a[:, ANGULAR] / p.diagonal()).abs().where(used, 0.0)
-        experts = residual.where(~self.human, 0.0)
-        worst = experts if float(experts.max()) > limit else residual
-        return int(worst.argmax()) if float(worst.max()) > limit else None
+        residual = np.zeros(len(self))
+        residual[used] = np.abs(a[used, ANGULAR] / p.diagonal()[used])
+        experts = np.where(self.human, 0.0, residual)
+        worst = experts if experts.max() > limit else residual
+        return int(worst.argmax()) if worst.max() > limit else None
 
     def _forget(self) -> None:
         """Let the example go that the others say best, an expert's if there is any: the log still has it."""
         p = self._p.values
-        residual = ((p @ self.y) / p.diagonal()[:, None]).square().sum(dim=1)
+        residual = ((p @ self.y / p.diagonal()[:, None]) ** 2).sum(axis=1)
         if not self.human.all():
-            residual = residual.where(~self.human, torch.inf)
+            residual[self.human] = np.inf
         gone = int(residual.argmin())
         leave_out(p, gone)
         for kept in (self._p, self._x, self._y, self._w, self._human, self._groups, self._labels):
             kept.remove(gone)
 
 
-def leave_out(p: Tensor, i: int) -> None:
+def leave_out(p: Doubles, i: int) -> None:
     """Turn P, in place, into that of all examples but i, whose row and column become zero."""
-    row = p[i].clone()
-    p.addr_(row, row, alpha=-1.0 / float(row[i]))
+    row = p[i].copy()
+    p -= np.outer(row, row) / row[i]
     p[i], p[:, i] = 0.0, 0.0
 
 

@@ -34,7 +34,8 @@ class Place:
 
     @contextmanager
     def learner(self):
-        words = ["--name", self.name, "--connect", self.endpoint, "--method", "lira", "--run", str(self.folder / "run")]
+        at = ["--name", self.name, "--connect", self.endpoint]
+        words = [*at, "--method", "plus", "--no-record", "--run", str(self.folder / "run")]
         with ChildProcess("the learner", lira_command("fusion", *words), self.folder / "lira.fusion.log") as learner:
             learner.wait_ready("learns on", READY_S)
             yield learner

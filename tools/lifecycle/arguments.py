@@ -10,6 +10,7 @@ from lira.hal.errors import ConfigError, MissingExtraError
 from lira.tools.lifecycle.setup import PAGE_PORT, PORT, Setup, endpoint_of, run_folder
 from lira.tools.lifecycle.table import SETS, chosen, rows
 from lira.tools.options import DEFAULT, add_layout, add_seed
+from lira.tools.output.places import check_folder
 
 WORLD = "line"
 
@@ -56,6 +57,7 @@ def setup_of(args: argparse.Namespace, ports: Ports) -> Setup:
         raise ConfigError("--profile and --listen are the twin's", "A real robot has its own: leave them out.")
     world = "" if args.robot is not None else args.world or WORLD
     folder = args.run or run_folder(args.name, args.method if chosen_set == "teach" else chosen_set, world)
+    check_folder(folder)
     return Setup(
         name=args.name,
         endpoint=endpoint_of(args.robot) if args.robot is not None else args.listen or f"127.0.0.1:{ports.twin}",
@@ -90,6 +92,8 @@ def check_method(setup: Setup) -> None:
 
 
 def check_policy(setup: Setup) -> None:
-    """Refuse a novice that is not there. Raises `ConfigError`."""
-    if setup.policy.endswith(".safetensors") and not Path(setup.policy).is_file():
-        raise ConfigError(f"there is no novice {setup.policy}", "Name novice.safetensors in the folder of a run.")
+    """Refuse a policy that there is not. It loads what drives. Raises `ConfigError`, `StorageError`, `PluginError`."""
+    if setup.policy:
+        from lira.fusion.experts.load import check_named
+
+        check_named([setup.policy])
