@@ -52,7 +52,7 @@ class KernelNovice(Novice):
         """m(x) of several states with the turn times g."""
 
         def act(seen: Sequence[Features]) -> list[Action]:
-            k = self.ridge.k(torch.stack([self._x(each) for each in seen]))
+            k = self.ridge.k(np.stack([self._x(each) for each in seen]))
             if proving:
                 self._meet(k)
             return self.ridge.actions(k, self.ridge.gain)
@@ -128,7 +128,7 @@ class KernelNovice(Novice):
         }
         return KernelNet(replace(self._network.architecture, examples=int(used.sum())), weights)
 
-    def _meet(self, k: Tensor) -> None:
+    def _meet(self, k: Doubles) -> None:
         """Keep the kernel values [m, n] of states of a proving run."""
         self._met.extend(k)
         if len(self._met) >= MOST_MET:

@@ -245,7 +245,7 @@ class KernelRidge:
         (action,) = self.actions(self.k(x)[None], gain)
         return action
 
-    def actions(self, k: Tensor, gain: float = 1.0) -> list[tuple[float, float]]:
+    def actions(self, k: Doubles, gain: float = 1.0) -> list[tuple[float, float]]:
         """The same of several states, of which these are the kernel values [m, n]."""
         return [(clipped(linear), clipped(gain * angular)) for linear, angular in self.fit.mean(k).tolist()]
 
