@@ -10,7 +10,7 @@ from lira.fusion.teaching.ride import Drive
 from lira.hal.messages import Episode, Phase
 from lira.hal.profile import load_profile
 from lira.sim_backend.catalogue import load_world
-from lira.tools.runs.fleet import fleet
+from lira.tools.experiments.fleet import fleet
 
 PROFILE, WORLD = load_profile("thesis-sim"), load_world("line-obstacles")
 DRIVES = [Drive(Episode(layout, start_m=4.0), 6.0) for layout in (3, 4, 5)]

@@ -26,8 +26,8 @@ from lira.hal.profile import Field, RobotProfile, load_profile
 from lira.sim_backend.foresight import with_small_camera
 from lira.sim_backend.shifts import shifted
 from lira.sim_backend.world import World
+from lira.tools.experiments.fleet import Fleet, fleet
 from lira.tools.runs.course import Course, lap
-from lira.tools.runs.fleet import Fleet, fleet
 from lira.tools.runs.simulated import SimulatedRobot, simulate
 
 Way = Literal["plain", "field", "shield", "ask"]

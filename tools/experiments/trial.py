@@ -22,11 +22,11 @@ from lira.sim_backend.catalogue import load_world
 from lira.sim_backend.foresight import with_small_camera
 from lira.sim_backend.scenes.opening import quickest
 from lira.sim_backend.world import World
+from lira.tools.experiments.fleet import fleet
 from lira.tools.experiments.notes import Notes, Track
 from lira.tools.experiments.quality import Judged, Point, Quality, judging, teach_to
 from lira.tools.runs.build import build_method, teacher
 from lira.tools.runs.course import Course, run_course
-from lira.tools.runs.fleet import fleet
 from lira.tools.runs.simulated import SimulatedRobot, simulate
 
 UNSEEN = 1000  # layouts from here on belong to nobody's training
