@@ -195,8 +195,10 @@ class KernelRidge:
     @property
     def aside(self) -> dict[int, int]:
         """The labels of which an example is set aside, and the first such example of each."""
-        examples = torch.nonzero(~self.fit.used)[:, 0].flip(0)
-        return dict(sorted((int(self.labels[i]), int(i)) for i in examples))
+        first: dict[int, int] = {}
+        for example in torch.nonzero(~self.fit.used)[:, 0].tolist():
+            first.setdefault(int(self.labels[example]), example)
+        return first
 
     def shares(self, x: Tensor) -> Tensor:
         """What each example adds to m(x) [n, 2]: m(x) = w(x)^T Y with w(x) = P k(x)."""
