@@ -40,19 +40,23 @@ class Sensors:
     """
 
     def __init__(self, profile: RobotProfile, layout: Layout, renderer: Renderer, seed: int) -> None:
-        self._profile = profile
-        self._camera_rng, lidar_rng, imu_rng = (np.random.default_rng([seed, stream]) for stream in (1, 2, 3))
+        self._camera_rng, self._lidar_rng, self._imu_rng = (
+            np.random.default_rng([seed, stream]) for stream in (1, 2, 3)
+        )
         self._scene = open_scene(profile.camera, layout, renderer)
-        self._camera = PinholeCamera(profile.camera, self._scene)
         self.drawer = self._scene.drawer
-        self._devices = self._build(profile, lidar_rng, imu_rng)
+        self._mount(profile)
         self._newest: dict[str, Stamped] = {}
 
-    def _build(
-        self, profile: RobotProfile, lidar_rng: np.random.Generator, imu_rng: np.random.Generator
-    ) -> dict[str, Device]:
+    def _mount(self, profile: RobotProfile) -> None:
+        """Put the profile's sensors onto the robot."""
+        self._profile = profile
+        self._camera = PinholeCamera(profile.camera, self._scene)
+        self._devices = self._build(profile)
+
+    def _build(self, profile: RobotProfile) -> dict[str, Device]:
         """What the profile has, by the names in the table of sensors."""
-        lidar, depth, battery = RayLidar(profile.lidar, self._scene, lidar_rng), profile.depth, profile.battery
+        lidar, depth, battery = RayLidar(profile.lidar, self._scene, self._lidar_rng), profile.depth, profile.battery
         devices = {
             "camera": Device(profile.camera.rate_hz, self._photograph),
             "scan": Device(profile.lidar.rate_hz, lambda motion, now_s: lidar.scan(_pose(motion), now_s)),
@@ -62,7 +66,7 @@ class Sensors:
                 depth.rate_hz, lambda motion, now_s: DepthImage(now_s, self._camera.depth(depth, _pose(motion)))
             )
         if profile.imu is not None:
-            devices["imu"] = Device(profile.imu.rate_hz, Accelerometer(profile.imu, imu_rng).read)
+            devices["imu"] = Device(profile.imu.rate_hz, Accelerometer(profile.imu, self._imu_rng).read)
         if battery is not None:
             devices["battery"] = Device(BATTERY.rate_hz, lambda _, now_s: read_battery(battery, now_s))
         for ranger in profile.ranger:
@@ -73,9 +77,13 @@ class Sensors:
         """Whatever was captured belongs to another episode, but for what outlives it."""
         self._newest = {name: value for name, value in self._newest.items() if name in LASTING}
 
-    def arrange(self, layout: Layout) -> None:
-        """Move the boxes."""
+    def arrange(self, layout: Layout, profile: RobotProfile) -> None:
+        """Move the boxes; with another profile, whose sensors differ in how they are mounted and how well they measure,
+        these are there from now on.
+        """
         self._scene.arrange(layout)
+        if profile != self._profile:
+            self._mount(profile)
 
     def newest(self, motion: Motion, now_s: float) -> dict[str, Stamped]:
         """Return the newest of every sensor, by its name; measures anew what is due."""

@@ -16,6 +16,7 @@ from lira.sim_backend.course import Course, footprint_radius_m
 from lira.sim_backend.layout import Layout, build
 from lira.sim_backend.scenes.opening import Renderer, settle
 from lira.sim_backend.sensors import ROUNDING_S, Sensors
+from lira.sim_backend.shifts import surroundings
 from lira.sim_backend.world import World
 
 ODOMETRY_PERIOD_S = 0.05
@@ -57,7 +58,8 @@ class Twin:
         # Rendering is slow, motion is not: whoever drives needs the second lock only. Taken in this order.
         self._sensor_lock = threading.Lock()
         self._lock = threading.Lock()
-        self._body = Body(profile.base, Course(build(self.world, layout), footprint_radius_m(profile.base)))
+        self._place = surroundings(self.world, profile, layout)
+        self._body = Body(profile.base, Course(build(self._place[0], layout), footprint_radius_m(profile.base)))
 
     @property
     def profile(self) -> RobotProfile:
@@ -83,7 +85,7 @@ class Twin:
         """Build the scene. Raises `ConfigError` if EGL is asked for and this machine has none."""
         with self._sensor_lock:
             if self._sensors is None:
-                self._sensors = Sensors(self._profile, self.layout, self._renderer, self._seed)
+                self._sensors = Sensors(self._place[1], self.layout, self._renderer, self._seed)
 
     def close(self) -> None:
         """Stop, and let go of the scene. May be called twice."""
@@ -114,7 +116,7 @@ class Twin:
             self._body.advance(self.now())
             stamp_s = self._body.time_s
             applied = judge_command(command, self._profile.base, stamp_s)
-            self._body.command(applied.twist)
+            self._body.command(slipping(applied.twist, self._profile.base, self._place[1].base))
         return applied
 
     def read(self) -> Observation:
@@ -160,9 +162,10 @@ class Twin:
     def _arrange(self, layout: int) -> None:
         if layout == self.layout.seed:
             return
-        self._body.course = Course(build(self.world, layout), self._body.course.radius_m)
+        self._place = world, profile = surroundings(self.world, self._profile, layout)
+        self._body.course = Course(build(world, layout), self._body.course.radius_m)
         if self._sensors is not None:
-            self._sensors.arrange(self.layout)
+            self._sensors.arrange(self.layout, profile)
 
     def _has_stepped(self, last: Observation, now_s: float) -> bool:
         """Whether somebody let time pass: each step has an observation of its own, also one that saw nothing new."""
@@ -177,6 +180,14 @@ class Twin:
 def _periods(time_s: float) -> int:
     """How many periods of the odometry have begun: a reader that a picture held up does not slow it down."""
     return math.floor((time_s + ROUNDING_S) / ODOMETRY_PERIOD_S)
+
+
+def slipping(told: Twist, base: Base, here: Base) -> Twist:
+    """What becomes of a command to wheels that slip `here`: as much less as the robot's fastest is there."""
+    return Twist(
+        told.linear_m_s * here.max_linear_m_s / base.max_linear_m_s,
+        told.angular_rad_s * here.max_angular_rad_s / base.max_angular_rad_s,
+    )
 
 
 def judge_command(command: Command, base: Base, stamp_s: float) -> Applied:

@@ -219,13 +219,18 @@ class Limits(Table, frozen=True):
 
 
 class World(Table, frozen=True):
-    """A whole world. `name` is filled in from the file's name."""
+    """A whole world. `name` is filled in from the file's name.
+
+    In one that is `randomised`, grays, noise, the camera's mounting and the wheels' slip differ from layout to layout,
+    as `shifts.py` draws them.
+    """
 
     description: str
     limits: Limits
     name: str = ""
     ground_gray: Gray = 180
     sky_gray: Gray = 230
+    randomised: bool = False
     start: Start = Start()
     line: Line | None = None
     patch: Annotated[tuple[Patch, ...], Meta(max_length=MAX_BOXES)] = ()

@@ -20,6 +20,14 @@ def natural(text: str) -> int:
     return value
 
 
+def positive(text: str) -> int:
+    """Read a whole number from 1 on: how many of something there shall be."""
+    value = int(text) if text.isdecimal() else 0
+    if value < 1:
+        raise argparse.ArgumentTypeError(f"'{text}' is not a whole number from 1 on")
+    return value
+
+
 def port(text: str) -> int:
     """Read a port to serve on; 0 is any that is free."""
     if not text.isdecimal() or not 0 <= int(text) < 65536:
@@ -67,6 +75,15 @@ def add_world(parser: argparse.ArgumentParser, default: str, what: str = "world"
 def add_layout(parser: argparse.ArgumentParser, what: str) -> None:
     """Declare `--layout`."""
     parser.add_argument("--layout", type=natural, default=0, help=f"{what} {DEFAULT}")
+
+
+def add_randomise(parser: argparse.ArgumentParser, where: str = "") -> None:
+    """Declare `--randomise`; `where` that happens."""
+    parser.add_argument(
+        "--randomise",
+        action="store_true",
+        help=f"{where}each layout with its own grays, noise, mounting of the camera and slip of the wheels",
+    )
 
 
 def add_seed(parser: argparse.ArgumentParser, what: str) -> None:

@@ -3,16 +3,18 @@
 import math
 from dataclasses import replace
 
-import torch
-from torch import Tensor
+import numpy as np
 
-from lira.fusion.inference.kernel_net import NEVER, KernelNet
+from lira.fusion.inference.kernel_net import NEVER, Doubles, KernelNet
 from lira.fusion.learning.labels import Label, mirror
 from lira.fusion.learning.learned_policy import Contradiction, Part
 from lira.fusion.learning.novice import LearningSettings, Novice
 from lira.fusion.policies.kernel import ANGULAR, KernelRidge, KernelSettings
 from lira.fusion.preprocess import Features
-from lira.hal.messages import Action, Driver
+from lira.hal.messages import Action, Driver, FloatArray
+
+ROUNDING = 1e-4  # of what a file holds in single precision: where it was proven it is not to doubt
+MOST_MET = 4096  # states that wait to be measured: 26 MB with 800 examples
 
 
 class KernelNovice(Novice):
@@ -28,7 +30,8 @@ class KernelNovice(Novice):
         self._mirrored = mirrored
         self._given: list[tuple[str, Action]] = []  # who gave each label, and what it says
         self._group = 0
-        self.limit = math.inf  # the largest deviation of its turn in the proving runs since the last label
+        self._limit = math.inf
+        self._met: list[Doubles] = []  # k [n] of states of its proving runs that `limit` does not know yet
         self.ridge = KernelRidge(dict(zip(sees.shapes, sees.trunk_sizes, strict=True)), settings)
 
     def act(self, features: Features) -> Action:
@@ -41,9 +44,17 @@ class KernelNovice(Novice):
 
     def proving(self, features: Features) -> Action:
         """The same. What it meets in the runs that prove it, it knows: the measure of its doubt afterwards."""
-        _, turn = self.deviation(features)
-        self.limit = turn if math.isinf(self.limit) else max(self.limit, turn)
+        self._met.append(self.ridge.k(self._x(features)))
+        if len(self._met) == MOST_MET:
+            self._measure_doubt()
         return self.alone(features)
+
+    @property
+    def limit(self) -> float:
+        """The largest deviation of its turn in the proving runs since the last label; infinite if it drove none."""
+        if self._met:
+            self._measure_doubt()
+        return self._limit
 
     def doubts(self, features: Features) -> bool:
         """Whether it knows less here than anywhere in the runs that proved it; never, if it drove none."""
@@ -69,7 +80,7 @@ class KernelNovice(Novice):
         self._given.append((label.source, label.action))
         self.stored += 1
         self.training_steps += 1
-        self.limit = math.inf
+        self._met, self._limit = [], math.inf
 
     def set_aside(self) -> list[Contradiction]:
         """Labels that contradict the rest, with what the others say there."""
@@ -88,7 +99,7 @@ class KernelNovice(Novice):
         parts = []
         for number in sorted(set(self.ridge.labels.tolist())):
             of_label = self.ridge.labels == number
-            linear, angular = shares[of_label].sum(dim=0).tolist()
+            linear, angular = shares[of_label].sum(axis=0).tolist()
             source, action = self._given[number]
             parts.append(Part(number, source, action, (linear, angular), float(likeness[of_label].max())))
         return sorted(parts, key=lambda part: -max(map(abs, part.share)))
@@ -97,16 +108,22 @@ class KernelNovice(Novice):
         """Return the network that drives alone: without what was set aside."""
         used, settings = self.ridge.fit.used, self._settings
         weights = self._network.weights() | {
-            "x": self.ridge.x[used].numpy(),
-            "y": self.ridge.y[used].float().numpy(),
-            "noise": (settings.noise / self.ridge.w[used]).float().numpy(),
-            "lengths": torch.tensor(self.ridge.lengths).numpy(),
-            "scale": self.ridge.fit.scale.float().numpy(),
-            "gain": torch.tensor([self.ridge.gain]).numpy(),
-            "limit": torch.tensor([min(self.limit, NEVER)]).numpy(),
+            "x": self.ridge.x[used],
+            "y": self.ridge.y[used].astype(np.float32),
+            "noise": (settings.noise / self.ridge.w[used]).astype(np.float32),
+            "lengths": self.ridge.lengths.astype(np.float32),
+            "scale": self.ridge.fit.scale.astype(np.float32),
+            "gain": np.array([self.ridge.gain], np.float32),
+            "limit": np.array([min((1.0 + ROUNDING) * self.limit, NEVER)], np.float32),
         }
         return KernelNet(replace(self._network.architecture, examples=int(used.sum())), weights)
 
-    def _x(self, features: Features) -> Tensor:
+    def _measure_doubt(self) -> None:
+        """Take in what it has met: all at once, and only when it matters, which for most laps is never."""
+        largest = float(self.ridge.fit.deviation(np.stack(self._met))[:, ANGULAR].max())
+        self._limit = largest if math.isinf(self._limit) else max(self._limit, largest)
+        self._met = []
+
+    def _x(self, features: Features) -> FloatArray:
         """x [size] of one state."""
-        return torch.from_numpy(self._network.see(features))
+        return self._network.see(features)

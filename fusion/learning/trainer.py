@@ -13,17 +13,19 @@ import signal
 from multiprocessing import resource_tracker
 from multiprocessing.connection import Connection
 from multiprocessing.context import SpawnContext
+from typing import TYPE_CHECKING
 
 import numpy as np
-import torch
 
 from lira.fusion.inference.architecture import Weights
+from lira.fusion.inference.threads import one_thread
 from lira.fusion.learning.labels import Label
-from lira.fusion.learning.learner import Learner
-from lira.fusion.policies.networks import FusionNet
 from lira.fusion.preprocess import Features
 from lira.hal.errors import LiraError
 from lira.hal.messages import FloatArray
+
+if TYPE_CHECKING:
+    from lira.fusion.learning.learner import Learner
 
 NICENESS = 5
 EXIT_TIMEOUT_S = 2.0  # between a process's last sign of life and its exit code
@@ -34,7 +36,7 @@ _EARLY_S = 1e-9  # simulated time is a sum of periods and may come out this much
 class InlineTrainer:
     """Trains at `start`, which takes as long as a training step does."""
 
-    def __init__(self, learner: Learner, *, adopt_after_s: float = 0.0) -> None:
+    def __init__(self, learner: "Learner", *, adopt_after_s: float = 0.0) -> None:
         self._learner = learner
         self._adopt_after_s = adopt_after_s
         self._weights: Weights | None = None
@@ -72,7 +74,7 @@ class ProcessTrainer:
     Takes over the learner with all that it holds. Returns once the process is ready, after a few seconds.
     """
 
-    def __init__(self, learner: Learner, *, adopt_after_s: float | None = None) -> None:
+    def __init__(self, learner: "Learner", *, adopt_after_s: float | None = None) -> None:
         self._adopt_after_s = adopt_after_s
         self._due_s = 0.0
         self._held: list[Label] = []  # while a step runs nobody reads the pipe
@@ -173,7 +175,7 @@ def _serve(pickled: bytes, pipe: Connection, shared: _SharedWeights) -> None:
     """Keep labels and train until the other end of the pipe is closed. None asks for a training step."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C reaches the whole group; the owner ends this process
     os.nice(NICENESS)
-    torch.set_num_threads(1)
+    one_thread()
     _warm_up()
     learner: Learner = pickle.loads(pickled)
     try:
@@ -192,6 +194,9 @@ def _serve(pickled: bytes, pipe: Connection, shared: _SharedWeights) -> None:
 
 def _warm_up() -> None:
     """Train a small network for nothing: PyTorch loads much of itself at the first step, which takes seconds."""
+    from lira.fusion.learning.learner import Learner
+    from lira.fusion.policies.networks import FusionNet
+
     learner = Learner(FusionNet(SMALL, filters=4), seed=0, frozen_trunks=False)
     nothing = Features(**{name: np.zeros(shape, np.float32) for name, shape in SMALL.items()})
     learner.add(Label(nothing, (0.0, 0.0), "none"))

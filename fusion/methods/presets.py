@@ -94,6 +94,14 @@ class Preset(msgspec.Struct, frozen=True):
         """Which approach it is, in one word."""
         return self.approach.kind
 
+    @property
+    def packages(self) -> tuple[str, ...]:
+        """What has to be installed to teach by it: torch, where a network is trained. A method of one's own may ask."""
+        if isinstance(self.approach, OwnSettings | SwitchingSettings):
+            return ()
+        probes = isinstance(self.approach, LazyDaggerSettings | ThriftyDaggerSettings)
+        return ("torch",) if self.kernel is None or probes else ()
+
     def starting(self, who: str) -> "Preset":
         """Return the same with another driver before the first training step. Raises `ConfigError`."""
         return msgspec.structs.replace(self, approach=self.approach.starting(who))

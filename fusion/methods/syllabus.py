@@ -35,6 +35,11 @@ class Syllabus(Table, frozen=True):
             return "own"
         return f"fresh:{self.proofs}" if not self.spare else f"fresh:{self.proofs - self.spare}/{self.proofs}"
 
+    @property
+    def most_laps(self) -> int:
+        """After so many laps a run has no proving layouts of its own left."""
+        return PER_RUN // max(1, self.proofs)
+
     def taught(self, layout: int, lap: int) -> int:
         """Layout of a training lap, laps counting from 1, of a run whose own layout this is."""
         return layout if self.layouts == "own" else TAUGHT + PER_RUN * layout + lap

@@ -29,21 +29,28 @@ worst one leaves the fit, an expert's before a human's.
 
 Sources: Rasmussen & Williams, Gaussian Processes for Machine Learning (2006), eq. 2.25, 2.26 and section 5.4.2 (eq.
 5.10 to 5.12); leaving a group out: Hager (1989), Updating the Inverse of a Matrix. Appending a row or taking one out
-changes P by O(n^2) work, so it is done between two steps.
+changes P by O(n^2) work and in its place, so it is done between two steps.
+
+k itself, and the novice as it drives when nobody teaches it any more, are in `inference/kernel_net.py`.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 
-import torch
-from torch import Tensor
-from torch.nn.functional import normalize, pad
+import numpy as np
+from numpy.typing import NDArray
 
+from lira.fusion.inference.kernel_net import Doubles, kernel, parts
+from lira.fusion.policies.growing import Rows, Square
 from lira.hal.config import Table
+from lira.hal.messages import FloatArray
 
 LINEAR, ANGULAR = 0, 1
 GAINS = (1.0, 1.7)  # bounds of g: few interventions tell little of it, and beyond this nothing was gained
+
+Flags = NDArray[np.bool_]
+Numbers = NDArray[np.int64]
 
 
 class KernelSettings(Table, frozen=True):
@@ -57,72 +64,60 @@ class KernelSettings(Table, frozen=True):
     most: int = 800
 
 
-def unit(features: Tensor, sizes: Sequence[int]) -> Tensor:
-    """x [n, size] of the trunks' outputs [n, size], parts of these sizes: each is scaled to length 1."""
-    return torch.cat([normalize(part) for part in torch.split(features, list(sizes), dim=1)], dim=1)
-
-
-def kernel(one: Tensor, other: Tensor, sizes: Sequence[int], lengths: Sequence[float]) -> Tensor:
-    """k of all pairs, float64 [n, m], of states [n, size] and [m, size]; a size and a length scale for each part."""
-    exponent = torch.zeros(len(one), len(other), dtype=torch.float64)
-    parts = zip(torch.split(one, list(sizes), dim=1), torch.split(other, list(sizes), dim=1), lengths, strict=True)
-    for mine, theirs, length in parts:
-        exponent -= (1.0 - (mine @ theirs.T).double()) / length**2
-    return exponent.exp()
-
-
 @dataclass(frozen=True)
 class Fit:
-    """The regression on some examples: P float64 [n, n] with zero rows for what is set aside, Y float64 [n, 2]."""
+    """The regression on some examples: P [n, n] with zero rows for what is set aside, Y [n, 2], both float64.
 
-    p: Tensor
-    y: Tensor
-    noise: Tensor  # the diagonal of N [n]
-    used: Tensor  # bool [n]
-    human: Tensor  # bool [n]
-    groups: Tensor  # int64 [n]
+    It looks at what the regression is kept in, and so is good until the next example.
+    """
+
+    p: Doubles
+    y: Doubles
+    a: Doubles  # A [n, 2]
+    noise: Doubles  # the diagonal of N [n]
+    used: Flags  # [n]
+    human: Flags  # [n]
+    groups: Numbers  # [n]
+
+    def mean(self, k: Doubles) -> Doubles:
+        """m before it is clipped [..., 2], of the kernel values k [..., n] of some states."""
+        product: Doubles = k @ self.a
+        return product
+
+    def deviation(self, k: Doubles) -> Doubles:
+        """sd [..., 2]."""
+        variance = 1.0 - (k @ self.p * k).sum(axis=-1, keepdims=True)
+        sd: Doubles = self.scale * np.sqrt(np.maximum(0.0, variance))
+        return sd
 
     @cached_property
-    def a(self) -> Tensor:
-        """A [n, 2]."""
-        return self.p @ self.y
-
-    def mean(self, k: Tensor) -> Tensor:
-        """m before it is clipped [2], of the kernel values k [n] of one state."""
-        return k @ self.a
-
-    def deviation(self, k: Tensor) -> Tensor:
-        """sd [2]."""
-        variance: Tensor = 1.0 - k @ self.p @ k
-        return self.scale * variance.clamp(min=0.0).sqrt()
-
-    @cached_property
-    def left_out(self) -> tuple[Tensor, Tensor]:
+    def left_out(self) -> tuple[Doubles, Doubles]:
         """Of each example in use, by the other groups alone: residual [n, 2] and predicted variance [n]; else nan."""
-        residual, variance = torch.full_like(self.y, torch.nan), torch.full_like(self.y[:, 0], torch.nan)
-        for group in sorted(set(self.groups[self.used].tolist())):
-            members = torch.nonzero(self.used & (self.groups == group))[:, 0]
-            covariance = torch.linalg.inv(self.p[members][:, members])
+        residual, variance = np.full_like(self.y, np.nan), np.full(len(self.y), np.nan)
+        for group in np.unique(self.groups[self.used]):
+            members = np.flatnonzero(self.used & (self.groups == group))
+            covariance = np.linalg.inv(self.p[np.ix_(members, members)])
             residual[members] = covariance @ self.a[members]
             variance[members] = covariance.diagonal()
         return residual, variance
 
     @cached_property
-    def scale(self) -> Tensor:
+    def scale(self) -> Doubles:
         """s [2]; 1 where there is nothing to tell it by."""
         residual, variance = self.left_out
         if not self.used.any():
-            return torch.ones(2, dtype=torch.float64)
-        return (residual.square() / variance[:, None])[self.used].mean(dim=0).sqrt()
+            return np.ones(2)
+        s: Doubles = np.sqrt((residual**2 / variance[:, None])[self.used].mean(axis=0))
+        return s
 
     @cached_property
     def gain(self) -> float:
         """g."""
         shown = self.used & self.human
         turns = self.y[shown, ANGULAR]
-        predicted = (turns - self.left_out[0][shown, ANGULAR]).clamp(-1.0, 1.0)
+        predicted = np.clip(turns - self.left_out[0][shown, ANGULAR], -1.0, 1.0)
         low, high = GAINS
-        small, large = float(predicted.square().sum()), float(turns.square().sum())
+        small, large = float(predicted @ predicted), float(turns @ turns)
         return low if small == 0.0 else min(high, max(low, (large / small) ** 0.5))
 
     def surprise(self, share: float) -> float:
@@ -133,8 +128,8 @@ class Fit:
         shown = self.used & self.human
         if not shown.any():
             return 0.0
-        variance = (self.left_out[1] - self.noise)[shown].clamp(min=0.0)
-        return float(self.scale[ANGULAR] * variance.quantile(share).sqrt())
+        variance = np.maximum(0.0, (self.left_out[1] - self.noise)[shown])
+        return float(self.scale[ANGULAR] * np.sqrt(np.quantile(variance, share)))
 
 
 class KernelRidge:
@@ -142,41 +137,80 @@ class KernelRidge:
 
     def __init__(self, sizes: Mapping[str, int], settings: KernelSettings) -> None:
         """`sizes` of the parts of x, in order, by the names of the features that they come from."""
-        self._sizes = tuple(sizes.values())
-        self.lengths = tuple(dict(settings.lengths).get(name, settings.length) for name in sizes)
+        self._parts = parts(tuple(sizes.values()))
+        self.lengths = np.array([dict(settings.lengths).get(name, settings.length) for name in sizes])
         self._settings = settings
-        self.x = torch.empty(0, sum(self._sizes))  # float32 [n, size]
-        self.y = torch.empty(0, 2, dtype=torch.float64)
-        self.w = torch.empty(0, dtype=torch.float64)
-        self.human = torch.empty(0, dtype=torch.bool)
-        self.groups = torch.empty(0, dtype=torch.int64)
-        self.labels = torch.empty(0, dtype=torch.int64)  # which label each is an example of
-        self._p = torch.empty(0, 0, dtype=torch.float64)
+        self._x = Rows((sum(sizes.values()),), np.float32)
+        self._y = Rows((2,), np.float64)
+        self._w = Rows((), np.float64)
+        self._human = Rows((), np.bool_)
+        self._groups = Rows((), np.int64)
+        self._labels = Rows((), np.int64)
+        self._p = Square()
         self._fit: Fit | None = None
+        self._asked: tuple[FloatArray, Doubles] | None = None  # x and k(x) of the last state
 
     def __len__(self) -> int:
-        return len(self.y)
+        return self._y.count
 
-    def k(self, x: Tensor) -> Tensor:
-        """Kernel values of one state x [size] with all examples, float64 [n]."""
-        return kernel(self.x, x[None], self._sizes, self.lengths)[:, 0]
+    @property
+    def x(self) -> FloatArray:
+        """Float32 [n, size]."""
+        return self._x.rows
+
+    @property
+    def y(self) -> Doubles:
+        """Y, float64 [n, 2]."""
+        return self._y.rows
+
+    @property
+    def w(self) -> Doubles:
+        """Weights, float64 [n]."""
+        return self._w.rows
+
+    @property
+    def human(self) -> Flags:
+        """Whether a human gave it [n]."""
+        return self._human.rows
+
+    @property
+    def groups(self) -> Numbers:
+        """Which group each belongs to [n]."""
+        return self._groups.rows
+
+    @property
+    def labels(self) -> Numbers:
+        """Which label each is an example of [n]."""
+        return self._labels.rows
+
+    def k(self, x: FloatArray) -> Doubles:
+        """Kernel values of one state x [size] with all examples, float64 [n], or of several [m, size], [m, n].
+
+        Of the state that was asked about last they are known: a step asks for its action, its doubt and its label.
+        """
+        if x.ndim > 1:
+            return kernel(self.x, x, self._parts, self.lengths**2).T
+        if self._asked is None or not np.array_equal(x, self._asked[0]):
+            self._asked = x.copy(), kernel(self.x, x[None], self._parts, self.lengths**2)[:, 0]
+        return self._asked[1]
 
     def add(
-        self, x: Tensor, action: tuple[float, float], weight: float, *, human: bool, group: int, label: int
+        self, x: FloatArray, action: tuple[float, float], weight: float, *, human: bool, group: int, label: int
     ) -> None:
         """Append one example x [size] of a label: P is bordered (Schur complement). Of too many, one has to go."""
         k = self.k(x)
-        pk = self._p @ k
-        schur = 1.0 + self._settings.noise / weight - k @ pk
-        row = torch.cat([-pk, torch.ones(1, dtype=torch.float64)])
-        self._p = pad(self._p, (0, 1, 0, 1)) + torch.outer(row, row) / schur
-        self.x = torch.cat([self.x, x[None]])
-        self.y = torch.cat([self.y, torch.tensor([action], dtype=torch.float64)])
-        self.w = torch.cat([self.w, torch.tensor([weight], dtype=torch.float64)])
-        self.human = torch.cat([self.human, torch.tensor([human])])
-        self.groups = torch.cat([self.groups, torch.tensor([group])])
-        self.labels = torch.cat([self.labels, torch.tensor([label])])
-        self._fit = None
+        p = self._p.values
+        pk = p @ k
+        schur = 1.0 + self._settings.noise / weight - float(k @ pk)
+        p += np.outer(pk, pk) / schur
+        self._p.border(-pk / schur, 1.0 / schur)
+        self._x.append(x)
+        self._y.append(action)
+        self._w.append(weight)
+        self._human.append(human)
+        self._groups.append(group)
+        self._labels.append(label)
+        self._fit = self._asked = None
         if len(self) > self._settings.most:
             self._forget()
 
@@ -184,27 +218,31 @@ class KernelRidge:
     def fit(self) -> Fit:
         """The regression without what contradicts the rest."""
         if self._fit is None:
-            used = torch.ones(len(self), dtype=torch.bool)
-            p = self._p.clone()
-            while (worst := self._contradiction(p, used)) is not None:
+            used = np.ones(len(self), np.bool_)
+            p, y = self._p.values, self.y
+            a = p @ y
+            while (worst := self._contradiction(p, a, used)) is not None:
+                if p is self._p.values:
+                    p = p.copy()
                 leave_out(p, worst)
                 used[worst] = False
-            self._fit = Fit(p, self.y, self._settings.noise / self.w, used, self.human, self.groups)
+                a = p @ y
+            self._fit = Fit(p, y, a, self._settings.noise / self.w, used, self.human, self.groups)
         return self._fit
 
     @property
     def aside(self) -> dict[int, int]:
         """The labels of which an example is set aside, and the first such example of each."""
         first: dict[int, int] = {}
-        for example in torch.nonzero(~self.fit.used)[:, 0].tolist():
+        for example in np.flatnonzero(~self.fit.used).tolist():
             first.setdefault(int(self.labels[example]), example)
         return first
 
-    def shares(self, x: Tensor) -> Tensor:
+    def shares(self, x: FloatArray) -> Doubles:
         """What each example adds to m(x) [n, 2]: m(x) = w(x)^T Y with w(x) = P k(x)."""
         return (self.fit.p @ self.k(x))[:, None] * self.y
 
-    def act(self, x: Tensor, gain: float = 1.0) -> tuple[float, float]:
+    def act(self, x: FloatArray, gain: float = 1.0) -> tuple[float, float]:
         """m(x), the turn times `gain`, clipped."""
         linear, angular = self.fit.mean(self.k(x)).tolist()
         return clipped(linear), clipped(gain * angular)
@@ -214,33 +252,33 @@ class KernelRidge:
         """g, or what is set instead of it."""
         return self.fit.gain if self._settings.gain is None else self._settings.gain
 
-    def _contradiction(self, p: Tensor, used: Tensor) -> int | None:
+    def _contradiction(self, p: Doubles, a: Doubles, used: Flags) -> int | None:
         """The example that is to be set aside next."""
         limit = self._settings.contradicts
         if limit is None or not used.any():
             return None
-        residual = ((p @ self.y[:, ANGULAR]) / p.diagonal()).abs().where(used, 0.0)
-        experts = residual.where(~self.human, 0.0)
-        worst = experts if float(experts.max()) > limit else residual
-        return int(worst.argmax()) if float(worst.max()) > limit else None
+        residual = np.zeros(len(self))
+        residual[used] = np.abs(a[used, ANGULAR] / p.diagonal()[used])
+        experts = np.where(self.human, 0.0, residual)
+        worst = experts if experts.max() > limit else residual
+        return int(worst.argmax()) if worst.max() > limit else None
 
     def _forget(self) -> None:
         """Let the example go that the others say best, an expert's if there is any: the log still has it."""
-        residual = ((self._p @ self.y) / self._p.diagonal()[:, None]).square().sum(dim=1)
+        p = self._p.values
+        residual = ((p @ self.y / p.diagonal()[:, None]) ** 2).sum(axis=1)
         if not self.human.all():
-            residual = residual.where(~self.human, torch.inf)
+            residual[self.human] = np.inf
         gone = int(residual.argmin())
-        stay = torch.arange(len(self)) != gone
-        leave_out(self._p, gone)
-        self._p = self._p[stay][:, stay]
-        self.x, self.y, self.w = self.x[stay], self.y[stay], self.w[stay]
-        self.human, self.groups, self.labels = self.human[stay], self.groups[stay], self.labels[stay]
+        leave_out(p, gone)
+        for kept in (self._p, self._x, self._y, self._w, self._human, self._groups, self._labels):
+            kept.remove(gone)
 
 
-def leave_out(p: Tensor, i: int) -> None:
+def leave_out(p: Doubles, i: int) -> None:
     """Turn P, in place, into that of all examples but i, whose row and column become zero."""
-    row = p[i].clone()
-    p.addr_(row, row, alpha=-1.0 / float(row[i]))
+    row = p[i].copy()
+    p -= np.outer(row, row) / row[i]
     p[i], p[:, i] = 0.0, 0.0
 
 

@@ -23,11 +23,9 @@ SCENES = [
     ("null", [SMALL, SMALL]),
     ("null", [HUGE]),
     ("null", [LONG_QUERIES]),
-    ("twin", [LARGE, LARGE]),
     ("twin", [("flood", 1_000_000, EVERYWHERE), QUERIES]),
     ("wire", [LARGE, LARGE]),
-    ("ros2", [LARGE, ("flood", 1_000_000, [TELEOP.key])]),
-    ("ros2", [QUERIES]),
+    ("ros2", [LARGE, ("flood", 1_000_000, [TELEOP.key]), QUERIES]),
 ]
 
 

@@ -21,7 +21,7 @@ READY_S = 90.0
 END_S = 10.0  # 3 s are promised; the rest is for a busy machine
 SIGNALS = (signal.SIGINT, signal.SIGTERM)
 SETTLE_S = 0.5
-WARM_S = 4.0
+WARM_S = 2.0
 
 
 class Stage:
@@ -99,7 +99,7 @@ def demo(stage):
 
 
 def wired_demo(stage):
-    return stage.start("demo", "demo", "--wire", "--run", stage.folder / "run", ready=OPEN)
+    return stage.start("demo", "demo", "--wire", "--no-record", "--run", stage.folder / "run", ready=OPEN)
 
 
 def twin(stage):
@@ -131,7 +131,7 @@ def calibrate(stage):
 
 def taught(stage):
     stage.twin("--lockstep")
-    words = ["--method", "lira", "--teacher", "scripted", "--run", stage.folder / "run"]
+    words = ["--method", "plus", "--no-record", "--teacher", "scripted", "--run", stage.folder / "run"]
     process = stage.start("fusion", "fusion", *stage.connect, *words)
     wait_for((stage.folder / "run" / "run.jsonl").exists, process)
     return process
@@ -208,7 +208,7 @@ def test_a_signal_ends_it(stage, verb, number):
 
 
 CLIENTS = {
-    "person": (["fusion", "--method", "lira", "--run", "{folder}/run"], "learns on"),
+    "person": (["fusion", "--method", "plus", "--paused", "--no-record", "--run", "{folder}/run"], "learns on"),
     "policy": (["drive", "camera-expert"], "drives '"),
     "console": (["console"], "console shows"),
     "joystick": (["joystick"], "joystick waits for a pad"),

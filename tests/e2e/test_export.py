@@ -8,7 +8,7 @@ import numpy as np
 import pyarrow.parquet as pq
 import pytest
 from rerun.chunk import RrdReader
-from short_worlds import SHORT
+from short_worlds import FEW_METRES
 
 from lira.fusion.log.label_log import read_demonstrations
 from lira.fusion.modalities.image import gray_image
@@ -25,7 +25,7 @@ RUN_S = 120.0
 def run(tmp_path_factory):
     """Folder of a run of one lap, recorded by `lira record`."""
     folder = tmp_path_factory.mktemp("export")
-    (folder / "short.toml").write_text(SHORT)
+    (folder / "short.toml").write_text(FEW_METRES)
     endpoint = f"127.0.0.1:{free_port()}"
     robot = ["--name", f"x{uuid.uuid4().hex}"]
     at = [*robot, "--connect", endpoint]
@@ -39,8 +39,12 @@ def run(tmp_path_factory):
         world = ["--world", str(folder / "short.toml"), "--renderer", "sketch", "--lockstep", "--listen", endpoint]
         start(stack, "serves world", "twin", *robot, *world)
         recorder = start(stack, "records", "record", *at, "--out", str(folder / "run/recording"))
-        teach = ["--method", "hold", "--teacher", "scripted", "--train-laps", "1", "--run", str(folder / "run")]
-        fusion = ChildProcess("fusion", lira_command("fusion", *at, *teach), folder / "fusion.log")
+        lesson = ["--method", "plus", "--teacher", "scripted", "--train-laps", "1"]
+        fusion = ChildProcess(
+            "fusion",
+            lira_command("fusion", *at, *lesson, "--no-record", "--run", str(folder / "run")),
+            folder / "fusion.log",
+        )
         with fusion:
             assert fusion.wait(RUN_S) in (0, 1), fusion.output()
         recorder.signal(signal.SIGINT)

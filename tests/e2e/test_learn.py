@@ -6,7 +6,7 @@ from functools import partial
 import pytest
 import torch
 from safetensors.numpy import load_file
-from short_worlds import SHORT
+from short_worlds import FEW_METRES
 
 from lira.fusion.control import ControlLoop
 from lira.fusion.learning.trainer import ProcessTrainer
@@ -24,14 +24,14 @@ from lira.tools.launch.processes import ChildProcess, lira_command
 from lira.tools.runs.build import build_method, teacher
 from lira.tools.runs.course import lap
 
-LAPS = 2
+LAPS = 1
 DEMO_S = 120.0
 
 
 @pytest.fixture(scope="module")
 def world(tmp_path_factory):
     path = tmp_path_factory.mktemp("world") / "short.toml"
-    path.write_text(SHORT)
+    path.write_text(FEW_METRES)
     return path
 
 

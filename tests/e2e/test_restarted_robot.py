@@ -8,12 +8,13 @@ from contextlib import contextmanager
 from lira.fusion.log.label_log import read_demonstrations
 from lira.hal.bus.bus import Bus
 from lira.hal.client.remote import RemoteRobot
-from lira.hal.messages import STOP, Command, Source, Twist
+from lira.hal.messages import STOP, Command, Reason, Source, Twist
 from lira.tools.launch.processes import ChildProcess, free_port, lira_command
 
 READY_S = 90.0
-SPEED = 5.0  # the first robot's clock is soon so far that nobody would wait for it
+SPEED = 3.0  # the first robot's clock is soon so far that nobody would wait for it
 LABELS = 10
+REST_S = 0.5
 END_S = 10.0  # 3 s are promised; the rest is for a busy machine
 
 
@@ -33,7 +34,8 @@ class Place:
 
     @contextmanager
     def learner(self):
-        words = ["--name", self.name, "--connect", self.endpoint, "--method", "lira", "--run", str(self.folder / "run")]
+        at = ["--name", self.name, "--connect", self.endpoint]
+        words = [*at, "--method", "plus", "--no-record", "--run", str(self.folder / "run")]
         with ChildProcess("the learner", lira_command("fusion", *words), self.folder / "lira.fusion.log") as learner:
             learner.wait_ready("learns on", READY_S)
             yield learner
@@ -51,16 +53,18 @@ class Place:
 
 @contextmanager
 def hand(place):
-    """Holds the dead-man: at rest for a moment, then ahead."""
+    """Holds the dead-man: at rest for a moment, then ahead; and so again where the robot stands and wants it."""
     bus = Bus(place.name, connect=place.endpoint)
     robot, stop = RemoteRobot(bus, answer_s=READY_S), threading.Event()
     robot.open()
 
     def drive():
-        began_s = time.monotonic()
+        rest_until_s = time.monotonic() + REST_S
         while not stop.wait(1 / 30):
-            twist = STOP if time.monotonic() - began_s < 0.5 else Twist(0.2, 0.0)
-            robot.drive(Command(twist, robot.now(), Source.TELEOP))
+            moves = time.monotonic() >= rest_until_s
+            applied = robot.drive(Command(Twist(0.2, 0.0) if moves else STOP, robot.now(), Source.TELEOP))
+            if moves and applied.reason is not Reason.OK:
+                rest_until_s = time.monotonic() + REST_S
 
     thread = threading.Thread(target=drive)
     thread.start()

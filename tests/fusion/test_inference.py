@@ -13,7 +13,7 @@ from lira.fusion.inference.architecture import Architecture
 from lira.fusion.inference.build import alone, driving
 from lira.fusion.inference.trunks import PictureTrunk
 from lira.fusion.policies.ensemble import EnsembleNet
-from lira.fusion.policies.kernel import KernelSettings, kernel, unit
+from lira.fusion.policies.kernel import KernelRidge, KernelSettings
 from lira.fusion.policies.networks import ExpertNet, FusionNet, batch_of_one
 from lira.fusion.preprocess import Features
 
@@ -61,26 +61,22 @@ def test_a_kernel_s_page_and_what_drives_agree():
     n, rng = 40, np.random.default_rng(4)
     blank = kernel_net(101, 16, seed=6)
     what = Architecture("kernel", blank.architecture.shapes, 16, examples=n)
-    x = np.stack([blank.see(noise(101, seed)) for seed in range(n)])
+    ridge = KernelRidge(dict(zip(what.shapes, what.trunk_sizes, strict=True)), KernelSettings(contradicts=None))
+    for i, action in enumerate(rng.uniform(-1, 1, (n, 2)).tolist()):
+        ridge.add(blank.see(noise(101, i)), tuple(action), 1.0, human=True, group=i, label=i)
     weights = blank.weights() | {
-        "x": x,
-        "y": rng.uniform(-1, 1, (n, 2)).astype(np.float32),
-        "noise": np.full(n, 0.1, np.float32),
+        "x": ridge.x,
+        "y": ridge.y.astype(np.float32),
+        "noise": np.full(n, KernelSettings().noise, np.float32),
         "lengths": np.full(2, KernelSettings().length, np.float32),
+        "scale": ridge.fit.scale.astype(np.float32),
         "gain": np.full(1, 1.3, np.float32),
     }
     network = driving(what, weights)
-    sizes, lengths = what.trunk_sizes, weights["lengths"].tolist()
-    torch.testing.assert_close(unit(torch.from_numpy(x), sizes), torch.from_numpy(x))
-    states = torch.from_numpy(x)
-    p = torch.linalg.inv(kernel(states, states, sizes, lengths) + 0.1 * torch.eye(n, dtype=torch.float64))
-    for seed in (3, 99):
-        seen = noise(101, seed)
-        k = kernel(states, torch.from_numpy(blank.see(seen))[None], sizes, lengths)[:, 0]
-        linear, angular = (k @ (p @ torch.from_numpy(weights["y"]).double())).tolist()
-        assert network.act(seen) == pytest.approx((linear, np.clip(1.3 * angular, -1, 1)), abs=1e-5)
-        deviation = float((1 - k @ p @ k).clamp(min=0).sqrt())
-        assert network.deviation(seen) == pytest.approx((deviation, deviation), abs=1e-5)
+    for seen in (noise(101, 3), noise(101, 99)):
+        x = blank.see(seen)
+        assert network.act(seen) == pytest.approx(ridge.act(x, gain=1.3), abs=1e-5)
+        assert network.deviation(seen) == pytest.approx(ridge.fit.deviation(ridge.k(x)), abs=1e-5)
 
 
 def test_what_experts_and_novice_see_with_the_same_trunk_is_looked_at_once_a_step(monkeypatch):
@@ -152,16 +148,21 @@ class Blocked:
             raise AssertionError(f"{name} is imported")
 
 sys.meta_path.insert(0, Blocked())
-import lira.tools.runs.alone, lira.tools.verbs.learn.drive
+import lira.tools.live.sitting, lira.tools.runs.alone, lira.tools.runs.with_person, lira.tools.verbs.learn.drive
+from lira.fusion.methods.presets import method_named
+from lira.tools.runs.build import build_method
 from lira.fusion.experts.load import load_alone
 from lira.hal.profile import load_profile
 import numpy as np, lira
 seen = lira.Features(scan=np.ones(101, np.float32), image=np.ones((32, 32), np.float32))
 for policy in ("camera-expert", "lidar-expert"):
     print(load_alone(policy, load_profile("thesis-sim"), shield=True).propose(seen).choice.driver)
+plus = build_method(method_named("plus"), load_profile("thesis-sim"), 0, trainer=None)
+plus.learn(plus.propose(seen), (1.0, 0.5))
+print(plus.novice.stored, plus.novice.act(seen)[0] > 0.5)
 """
 
 
-def test_driving_needs_neither_torch_nor_a_simulator():
+def test_driving_and_teaching_by_plus_need_neither_torch_nor_a_simulator():
     done = subprocess.run([sys.executable, "-c", BLOCKED], capture_output=True, text=True, timeout=60, check=False)
-    assert (done.stdout.split(), done.stderr) == (["camera", "lidar"], "")
+    assert (done.stdout.split(), done.stderr) == (["camera", "lidar", "1", "True"], "")

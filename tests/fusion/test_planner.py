@@ -89,8 +89,8 @@ BEND = World(
 
 @pytest.mark.parametrize("style", STYLES)
 @pytest.mark.parametrize("start_m", [3.5, 9.0])
-@pytest.mark.parametrize("lateral_m", [-0.4, 0.0, 0.3])
-@pytest.mark.parametrize("yaw_rad", [-2.8, -2.0, -1.2, 1.6, 2.4, math.pi])
+@pytest.mark.parametrize("lateral_m", [-0.4, 0.3])
+@pytest.mark.parametrize("yaw_rad", [-2.8, -1.2, 2.0, math.pi])
 def test_whichever_way_it_looks_it_comes_round_and_never_drives_the_line_backwards(style, start_m, lateral_m, yaw_rad):
     states = drive(BEND, style, Episode(start_m=start_m, lateral_m=lateral_m, yaw_rad=yaw_rad))
     progress_m = [state.progress_m for state in states]

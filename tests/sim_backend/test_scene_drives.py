@@ -12,8 +12,8 @@ from lira.sim_backend.foresight import with_small_camera
 from lira.sim_backend.twin import Twin
 
 # Drives of an expert's own curriculum: few enough for pybullet, and each for a part of it.
-DRIVES = 3
-LIMIT_S = 25.0
+DRIVES = 2
+LIMIT_S = 12.0
 
 
 @pytest.mark.parametrize("task", TASKS)

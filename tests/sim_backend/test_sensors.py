@@ -207,11 +207,11 @@ def test_another_layout_shows_its_own_boxes_and_none_of_the_last(sensors):
     world = World(description="", line=ROAD, along=(Along(count=5, on=0.0),), limits=Limits(lost_m=9.0, finish_m=50.0))
     eye = sensors(build(world, 0))
     first, first_scan = picture(eye, x=5.0), ranges(eye, x=5.0)
-    eye.arrange(build(world, 1))
+    eye.arrange(build(world, 1), SIM)
     second = picture(eye, x=5.0)
     assert (first != second).any()
     assert (second == picture(sensors(build(world, 1)), x=5.0)).all()
-    eye.arrange(build(world, 0))
+    eye.arrange(build(world, 0), SIM)
     assert (picture(eye, x=5.0) == first).all()
     assert (ranges(eye, x=5.0) == first_scan).all()
 

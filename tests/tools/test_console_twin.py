@@ -66,8 +66,10 @@ def test_a_person_teaches_with_the_keyboard_alone(tmp_path):
     port = free_port()
     name, endpoint = f"typed_{port}", f"127.0.0.1:{port}"
     run = tmp_path / "run"
-    twin = lira_command("twin", "--name", name, "--listen", endpoint, "--world", "line")
-    fusion = lira_command("fusion", "--name", name, "--connect", endpoint, "--method", "hg-dagger", "--run", str(run))
+    twin = lira_command("twin", "--name", name, "--listen", endpoint, "--world", "line", "--renderer", "sketch")
+    fusion = lira_command(
+        "fusion", "--name", name, "--connect", endpoint, "--method", "hg-dagger", "--run", str(run), "--no-record"
+    )
     with ExitStack() as stack:
         process = stack.enter_context(ChildProcess("the twin", twin, tmp_path / "twin.log"))
         process.wait_ready("serves world", READY_S)

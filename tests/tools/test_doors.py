@@ -69,8 +69,9 @@ def lira_on_twin(lab, capsys):
 
     def run(*words):
         address, name = f"127.0.0.1:{free_port()}", f"t{uuid.uuid4().hex}"
-        words_of_twin = ("--lockstep", "--name", name, "--listen", address, "--world", write_world(lab))
-        with ChildProcess("twin", lira_command("twin", *words_of_twin), lab / "twin.log") as twin:
+        drawn = ("--lockstep", "--renderer", "sketch", "--world", write_world(lab))
+        command = lira_command("twin", *drawn, "--name", name, "--listen", address)
+        with ChildProcess("twin", command, lab / "twin.log") as twin:
             twin.wait_ready("serves world", 60.0)
             status = cli.main([*words, "--name", name, "--connect", address])
         return status, *capsys.readouterr()

@@ -24,7 +24,9 @@ def lira(tmp_path, capsys):
     def run(world, *words):
         address = f"127.0.0.1:{free_port()}"
         name = f"t{uuid.uuid4().hex}"
-        command = lira_command("twin", "--lockstep", "--name", name, "--listen", address, "--world", world)
+        command = lira_command(
+            "twin", "--lockstep", "--renderer", "sketch", "--name", name, "--listen", address, "--world", world
+        )
         with ChildProcess("twin", command, tmp_path / "twin.log") as twin:
             twin.wait_ready("twin", 30.0)
             status = cli.main([*words, "--name", name, "--connect", address])

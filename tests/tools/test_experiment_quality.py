@@ -1,19 +1,13 @@
 """A real trial that is taught to a quality, on a short world; and how worlds and robots are shifted for it."""
 
 import msgspec
-import numpy as np
 import pytest
 from short_trials import write_world
 
 from lira.fusion.methods.presets import METHODS
 from lira.fusion.methods.syllabus import with_proof
 from lira.fusion.teaching.teacher import PERFECT
-from lira.hal.errors import ConfigError
-from lira.hal.profile import load_profile
-from lira.sim_backend.catalogue import load_world
-from lira.sim_backend.layout import build
 from lira.tools.experiments.quality import WAYS, Quality
-from lira.tools.experiments.shifts import BENDS, BOXES, SHIFTS, shifted
 from lira.tools.experiments.trial import Trial, play
 
 TO = Quality(layouts=2, ways=WAYS, shift="noise", more=1)
@@ -47,32 +41,9 @@ def test_who_reaches_the_lowest_level_is_tried_in_every_way_and_once_more_after_
     assert not outcome.tracks
 
 
-PROFILE = load_profile("thesis-sim")
-WORLD = load_world("line-obstacles")
-
-
-@pytest.mark.parametrize("shift", SHIFTS)
-def test_every_shift_changes_something_and_leaves_a_world_that_can_be_built(shift):
-    world, profile = shifted(shift, WORLD, PROFILE)
-    assert (world, profile) != (WORLD, PROFILE)
-    assert (world == WORLD) != (profile == PROFILE)
-    assert len(build(world, 3).blocks) == 8
-
-
-def test_nothing_is_shifted_that_nobody_asked_for():
-    assert shifted(None, WORLD, PROFILE) == (WORLD, PROFILE)
-
-
-def test_boxes_grow_but_stay_as_high_and_bends_get_tighter():
-    plain, grown = build(WORLD, 3).blocks[0], build(shifted("boxes", WORLD, PROFILE)[0], 3).blocks[0]
-    assert grown.length_m == pytest.approx(BOXES * plain.length_m)
-    assert grown.height_m == plain.height_m
-    tight = build(shifted("curvature", WORLD, PROFILE)[0], 3).curve
-    assert tight.length_m == pytest.approx(BENDS * build(WORLD, 3).curve.length_m, rel=1e-3)
-    turns = [np.abs(np.diff(np.unwrap(each.headings))).max() for each in (build(WORLD, 3).curve, tight)]
-    assert turns[1] > turns[0]
-
-
-def test_bends_of_a_world_with_boxes_in_fixed_places_are_left_alone():
-    with pytest.raises(ConfigError, match="bends"):
-        shifted("curvature", load_world("corridor"), PROFILE)
+def test_a_higher_cap_of_laps_shows_more_of_who_is_not_there_yet_and_changes_nothing_else(outcome):
+    trial = msgspec.structs.replace(outcome.trial, quality=msgspec.structs.replace(TO, ways=("plain",), more=0))
+    low, high = (play(msgspec.structs.replace(trial, laps=laps)) for laps in (1, 2))
+    assert high.points[: len(low.points)] == low.points == outcome.points[:1]
+    assert high.judged[: len(low.judged)] == low.judged
+    assert (len(high.points) == 1) == low.result.converged

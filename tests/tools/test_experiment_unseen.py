@@ -160,6 +160,8 @@ def test_where_by_whom_and_with_whose_experts_can_be_chosen():
         world="race",
         teacher="unskilled",
         shift="gray",
+        randomised=True,
+        laps=20,
         more=5,
         ways=("plain", "ask"),
     )
@@ -168,13 +170,15 @@ def test_where_by_whom_and_with_whose_experts_can_be_chosen():
     assert {(each.seed, each.experts) for each in trials} == {
         (seed, pair) for seed in (300, 301) for pair in ("line@1", "line@2")
     }
-    assert {(each.world, each.skill, each.quality.shift, each.quality.more) for each in trials} == {
-        ("race", UNSKILLED, "gray", 5)
+    assert {(each.world, each.skill, each.quality.shift, each.quality.more, each.laps) for each in trials} == {
+        ("race", UNSKILLED, "gray", 5, 20)
     }
     assert asked.command == (
         "--seeds 2 --methods plus --first-seed 300 --experts line@1,line@2 --world race --teacher unskilled "
-        "--shift gray --more 5 --ways plain,ask"
+        "--shift gray --randomise --laps 20 --more 5 --ways plain,ask"
     )
+    assert all(each.quality.randomised for each in trials)
+    assert asked.elsewhere == "-race-unskilled-randomised-gray-more5"
     assert len({each.file for each in trials}) == 4
 
 
@@ -185,6 +189,20 @@ def test_what_an_experiment_does_not_know_is_refused():
         Selection(1, ways=("rope",)).trials(load("unseen"), "unseen")  # type: ignore[arg-type]
     with pytest.raises(ConfigError, match="no shift 'snow'"):
         Selection(1, shift="snow").trials(load("unseen"), "unseen")
+
+
+def test_the_cap_of_laps_is_stated_and_no_run_drives_layouts_of_another():
+    assert {each.laps for each in load("unseen").trials(1)} == {unseen.LAPS} == {12}
+    assert {each.laps for each in Selection(1, laps=6).trials(load("ablation"), "ablation")} == {6}
+    most = unseen.to_quality("plus").syllabus.most_laps
+    proven = [layout for lap in range(1, most + 1) for layout in unseen.to_quality("plus").syllabus.proven(7, lap)]
+    assert not set(proven) & set(unseen.to_quality("plus").syllabus.proven(8, 1))
+    assert Selection(1, laps=most - 5, more=5).trials(load("unseen"), "unseen")
+    for selection in (Selection(1, laps=most, more=1), Selection(1, more=most)):
+        with pytest.raises(ConfigError, match="more are more than there are fresh layouts for"):
+            selection.trials(load("unseen"), "unseen")
+    with pytest.raises(ConfigError, match="takes no --world, --teacher, --shift, --randomise, --laps"):
+        Selection(1, laps=6).trials(load("table2"), "table2")
 
 
 def test_a_method_of_ones_own_is_taught_on_the_layouts_of_plus_and_shown_last(monkeypatch):

@@ -49,7 +49,9 @@ def bed(tmp_path):
 
 @pytest.fixture
 def twin(address, tmp_path):
-    command = lira_command("twin", "--name", address[0], "--listen", address[1], "--world", "line")
+    command = lira_command(
+        "twin", "--name", address[0], "--listen", address[1], "--world", "line", "--renderer", "sketch"
+    )
     with ChildProcess("the twin", command, tmp_path / "twin.log") as process:
         process.wait_ready("serves world", READY_S)
         yield process
@@ -85,8 +87,8 @@ def test_twin_and_joystick_drive_with_nothing_else_running(bed, hand, watch):
 
 
 def learner(address, tmp_path, *words):
-    command = lira_command("fusion", "--name", address[0], "--connect", address[1], "--run", str(tmp_path / "run"))
-    return ChildProcess("the learner", [*command, *words], tmp_path / "lira.fusion.log")
+    where = ["--name", address[0], "--connect", address[1], "--run", str(tmp_path / "run"), "--no-record"]
+    return ChildProcess("the learner", lira_command("fusion", *where, *words), tmp_path / "lira.fusion.log")
 
 
 def test_a_press_takes_control_from_the_learner_which_labels_it(bed, hand, watch, address, tmp_path):

@@ -193,7 +193,7 @@ class Wrong(Twin):
 @contextmanager
 def on_the_bus(**faults):
     """Serve a twin in real time in the room; yields a client's bus."""
-    twin = Wrong(load_profile("thesis-sim"), "room", realtime_factor=1.0)
+    twin = Wrong(load_profile("thesis-sim"), "room", realtime_factor=1.0, renderer="sketch")
     for name, value in faults.items():
         setattr(twin, name, value)
     name, endpoint, stop = f"p{uuid.uuid4().hex}", f"127.0.0.1:{free_port()}", threading.Event()

@@ -21,7 +21,6 @@ TRUNKS = ("shared", "own")  # whether the novice sees with its experts' trunks
 
 def run() -> list[Row]:
     """Return one row per number of filters and kind of trunks."""
-    torch.set_num_threads(1)
     one_thread()
     return [compare(filters, trunks) for filters in BINS for trunks in TRUNKS]
 

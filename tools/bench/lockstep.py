@@ -13,9 +13,8 @@ from functools import partial
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
-import torch
-
 from lira.fusion.control import ControlLoop
+from lira.fusion.inference.threads import one_thread
 from lira.fusion.learning.trainer import ProcessTrainer
 from lira.fusion.log.label_log import DemonstrationLog
 from lira.fusion.log.recorder import Journal
@@ -39,7 +38,7 @@ READY_S = 60.0
 
 def run() -> list[Row]:
     """Return one row: medians over several runs with fresh processes, and every run's factor."""
-    torch.set_num_threads(1)
+    one_thread()
     runs = [measure(layout) for layout in range(RUNS)]
     median = {name: statistics.median(one[name] for one in runs) for name in runs[0]}
     factors = [one["real_time_factor"] for one in runs]

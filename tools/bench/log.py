@@ -10,9 +10,10 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 
 import numpy as np
-import torch
 
-from lira.fusion.learning.learner import Label, Learner
+from lira.fusion.inference.threads import one_thread
+from lira.fusion.learning.labels import Label
+from lira.fusion.learning.learner import Learner
 from lira.fusion.log.label_log import Demonstration, DemonstrationLog, read_demonstrations
 from lira.fusion.policies.networks import FusionNet
 from lira.fusion.preprocess import Features, shapes_of
@@ -27,7 +28,7 @@ KINDS = 64  # different labels, over and over
 
 def run() -> list[Row]:
     """Return one row per thing done with the log; `rss_mb` is the resident size after it, `grown_mb` what it added."""
-    torch.set_num_threads(1)
+    one_thread()
     profile = load_profile(PROFILE)
     learner = Learner(FusionNet(shapes_of(profile), profile.features.filters), seed=0, frozen_trunks=True)
     learner.add(next(random_labels(1)))

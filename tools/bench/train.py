@@ -7,7 +7,9 @@ import numpy as np
 import torch
 from torch import Tensor, nn
 
-from lira.fusion.learning.learner import Label, Learner
+from lira.fusion.inference.threads import one_thread
+from lira.fusion.learning.labels import Label
+from lira.fusion.learning.learner import Learner
 from lira.fusion.learning.trainer import ProcessTrainer
 from lira.fusion.policies.networks import ExpertNet, FusionNet
 from lira.fusion.preprocess import Features, Shape
@@ -26,7 +28,7 @@ TRUNKS = ("full", "frozen")
 
 def run() -> list[Row]:
     """Return one row per network and kind of training. All on one thread."""
-    torch.set_num_threads(1)
+    one_thread()
     rows: list[Row] = []
     for filters, bins in BINS.items():
         labels = random_labels(bins)

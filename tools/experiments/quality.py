@@ -23,8 +23,8 @@ from lira.fusion.teaching.session import Session
 from lira.hal.messages import Phase
 from lira.hal.profile import Field, RobotProfile, load_profile
 from lira.sim_backend.foresight import with_small_camera
+from lira.sim_backend.shifts import shifted
 from lira.sim_backend.world import World
-from lira.tools.experiments.shifts import shifted
 from lira.tools.runs.course import Course, lap
 from lira.tools.runs.simulated import SimulatedRobot, simulate
 
@@ -38,9 +38,9 @@ FAR_M = 1.0  # no robot drives so far in a step: it was put down anew
 class Quality(msgspec.Struct, frozen=True):
     """What is asked of a novice: to pass these shares of `layouts` fresh ones after one lap, lowest first.
 
-    `ways` are those in which who reaches the lowest level is tried, under `shift`; the first one goes for all levels.
-    After the highest level `more` laps follow. A novice that can reach no level any more after half of the layouts is
-    not driven on the others.
+    Where it is taught and proven may be `randomised`; where it is tried afterwards is not. `ways` are those in which
+    who reaches the lowest level is tried, under `shift`; the first one goes for all levels. After the highest level
+    `more` laps follow. A novice that can reach no level any more after half of the layouts is not driven on the others.
     """
 
     layouts: int = 12
@@ -48,6 +48,7 @@ class Quality(msgspec.Struct, frozen=True):
     ways: tuple[Way, ...] = ("plain",)
     shift: str | None = None
     more: int = 0
+    randomised: bool = False
 
 
 def least(level: float, layouts: int) -> int:
@@ -178,7 +179,8 @@ def judging(
     hand: Hand,
 ) -> Judge:
     """Return what tries a novice on these layouts, in each way, in the world as it is shifted."""
-    place, body = shifted(quality.shift, world, with_small_camera(profile))
+    plain = msgspec.structs.replace(world, randomised=False)
+    place, body = shifted(quality.shift, plain, with_small_camera(profile))
 
     def judge(levels: tuple[float, ...]) -> list[Judged]:
         asked = quality.ways if quality.levels[0] in levels else quality.ways[:1]

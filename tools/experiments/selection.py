@@ -9,9 +9,9 @@ from msgspec.structs import replace
 from lira.fusion.methods.presets import method_named
 from lira.fusion.teaching.teacher import TEACHERS
 from lira.hal.errors import ConfigError
+from lira.sim_backend.shifts import SHIFTS
 from lira.tools.experiments.experiment import Experiment
 from lira.tools.experiments.quality import WAYS, Way
-from lira.tools.experiments.shifts import SHIFTS
 from lira.tools.experiments.trial import Trial
 
 ALL = "all"
@@ -21,8 +21,8 @@ ALL = "all"
 class Selection:
     """What is asked for. `methods` is a list with commas, "all", or None for the usual ones; `own` are a user's own.
 
-    `pairs` of experts replace the world's; `world`, `teacher`, `shift`, `more` laps and `ways` of deployment go with
-    experiments at equal quality.
+    `pairs` of experts replace the world's; `world`, `teacher`, `shift`, whether the world is `randomised` while it is
+    taught, the cap of `laps`, `more` laps and `ways` of deployment go with experiments at equal quality.
     """
 
     seeds: int
@@ -33,6 +33,8 @@ class Selection:
     world: str | None = None
     teacher: str | None = None
     shift: str | None = None
+    randomised: bool = False
+    laps: int | None = None
     more: int = 0
     ways: Sequence[Way] = ()
     all_experiments: bool = field(default=False, kw_only=True)
@@ -65,6 +67,8 @@ class Selection:
         words += [f"--world {self.world}"] if self.world is not None else []
         words += [f"--teacher {self.teacher}"] if self.teacher is not None else []
         words += [f"--shift {self.shift}"] if self.shift is not None else []
+        words += ["--randomise"] if self.randomised else []
+        words += [f"--laps {self.laps}"] if self.laps is not None else []
         words += [f"--more {self.more}"] if self.more else []
         words += [f"--ways {','.join(self.ways)}"] if self.ways else []
         return " ".join(words)
@@ -75,16 +79,18 @@ class Selection:
         parts = (
             self.world and Path(self.world).stem,
             self.teacher,
+            "randomised" if self.randomised else None,
             self.shift,
             f"more{self.more}" if self.more else None,
         )
         return "".join(f"-{part}" for part in parts if part)
 
     def _elsewhere(self, trial: Trial, name: str) -> Trial:
-        if (self.world, self.teacher, self.shift, self.more, self.ways) == (None, None, None, 0, ()):
+        asked = (self.world, self.teacher, self.shift, self.randomised, self.laps, self.more, self.ways)
+        if not any(asked):
             return trial
         if trial.quality is None:
-            what = f"{name} takes no --world, --teacher, --shift, --more or --ways"
+            what = f"{name} takes no --world, --teacher, --shift, --randomise, --laps, --more or --ways"
             raise ConfigError(what, "They go with 'unseen' and other experiments at equal quality.")
         teacher = self.teacher or trial.teacher
         if teacher not in TEACHERS or (self.shift is not None and self.shift not in SHIFTS):
@@ -93,9 +99,17 @@ class Selection:
         ways = tuple(self.ways) or trial.quality.ways
         if not set(ways) <= set(WAYS):
             raise ConfigError(f"no way of deployment '{min(set(ways) - set(WAYS))}'", f"Ways: {', '.join(WAYS)}.")
-        quality = replace(trial.quality, shift=self.shift, more=self.more, ways=ways)
+        laps, most = self.laps or trial.laps, trial.method.syllabus.most_laps
+        if not 0 < laps + self.more <= most:
+            what = f"{laps} laps and {self.more} more are more than there are fresh layouts for"
+            raise ConfigError(what, f"Give --laps and --more of {most} together.")
         return replace(
-            trial, world=self.world or trial.world, teacher=teacher, skill=TEACHERS[teacher], quality=quality
+            trial,
+            world=self.world or trial.world,
+            teacher=teacher,
+            skill=TEACHERS[teacher],
+            laps=laps,
+            quality=replace(trial.quality, shift=self.shift, more=self.more, ways=ways, randomised=self.randomised),
         )
 
 

@@ -90,11 +90,10 @@ class Outcome(msgspec.Struct, frozen=True):
 
 def play(trial: Trial) -> Outcome:
     """Run a trial in process, on one thread: its outcome does not depend on what runs beside it."""
-    import torch
-
-    torch.set_num_threads(1)
     one_thread()
     profile, world = trial.profile, load_world(trial.world)
+    if trial.quality is not None and trial.quality.randomised:
+        world = msgspec.structs.replace(world, randomised=True)
     first = UNSEEN + trial.seed * trial.unseen
     layouts = range(first, first + trial.unseen)
     course = Course(

@@ -7,12 +7,12 @@ where it was.
 
 import math
 from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
 
 from lira.fusion.inference.architecture import Weights
 from lira.fusion.inference.threads import one_thread
 from lira.fusion.learning.labels import Label
 from lira.fusion.learning.learned_policy import LearnedPolicy
-from lira.fusion.learning.learner import Learner
 from lira.fusion.learning.trainer import InlineTrainer
 from lira.fusion.log.method_trace import Decided, Learned, State, restored
 from lira.fusion.methods.base import Chooser, Method, Proposal
@@ -24,13 +24,16 @@ from lira.tools.inquiry.trace import OUTCOMES, Trace, outcome_of
 from lira.tools.runs.build import build_method
 from lira.tools.runs.plan import Recipe
 
+if TYPE_CHECKING:
+    from lira.fusion.learning.learner import Learner
+
 MOST_DIFFERENCES = 20
 
 
 class ToldTrainer(InlineTrainer):
     """Hands its weights out when it is told that this is when they were adopted."""
 
-    def __init__(self, learner: Learner, *, adopt_after_s: float) -> None:
+    def __init__(self, learner: "Learner", *, adopt_after_s: float) -> None:
         super().__init__(learner, adopt_after_s=adopt_after_s)
         self.follows = False  # until then, as on a twin: so long after the start of the training step
         self.told = False
@@ -85,7 +88,7 @@ def go_again(trace: Trace, profile: RobotProfile, recipe: Recipe | None = None) 
 
     Raises `ConfigError` for a method or experts that cannot be built here.
     """
-    _one_thread()
+    one_thread()
     return _Run(trace, profile, recipe).go()
 
 
@@ -94,18 +97,10 @@ def novice_before(trace: Trace, profile: RobotProfile, number: int) -> tuple[Lea
 
     Raises `ConfigError` as `go_again` does.
     """
-    _one_thread()
+    one_thread()
     run = _Run(trace, profile, None)
     run.go(until=number)
     return run.novice, restored(trace.calls[number].features, profile)
-
-
-def _one_thread() -> None:
-    """Compute as whoever teaches does: what comes out depends on it."""
-    import torch
-
-    torch.set_num_threads(1)
-    one_thread()
 
 
 class _Run:
@@ -125,7 +120,7 @@ class _Run:
         self._again = Again(trace)
         self._time_s = 0.0
 
-    def _trainer(self, learner: Learner) -> ToldTrainer:
+    def _trainer(self, learner: "Learner") -> ToldTrainer:
         trainer = ToldTrainer(learner, adopt_after_s=self._profile.period_s)
         self._trainers.append(trainer)
         return trainer

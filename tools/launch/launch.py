@@ -25,7 +25,9 @@ class Part:
     command: Callable[[str], list[str]]
 
 
-def twin_words(world: str, profile: str | None, seed: int, renderer: str | None = None) -> list[str]:
+def twin_words(
+    world: str, profile: str | None, seed: int, renderer: str | None = None, *, randomise: bool = False
+) -> list[str]:
     """Which twin it is, in words for `lira twin`: the robot of the world's experiment, and the quickest renderer.
 
     Raises `ConfigError` for a world or a profile that is none.
@@ -38,7 +40,8 @@ def twin_words(world: str, profile: str | None, seed: int, renderer: str | None 
     place = load_world(world)
     robot = profile or TASKS[task_of(place.name)].profile
     load_profile(robot)
-    return ["--world", world, "--profile", robot, "--renderer", renderer or quickest(place), "--seed", str(seed)]
+    words = ["--world", world, "--profile", robot, "--renderer", renderer or quickest(place), "--seed", str(seed)]
+    return [*words, "--randomise"] if randomise else words
 
 
 def direct(name: str, endpoint: str, twin: Sequence[str], *, lockstep: bool) -> list[Part]:

@@ -1,6 +1,7 @@
 """Puts learners together: which networks, which experts, which method, which teacher, which lap."""
 
 from collections.abc import Callable, Sequence
+from typing import TYPE_CHECKING
 
 import msgspec
 
@@ -11,13 +12,10 @@ from lira.fusion.inference.architecture import FUSION, KERNEL
 from lira.fusion.inference.kernel_net import KernelNet
 from lira.fusion.inference.networks import DrivingNet
 from lira.fusion.learning.kernel_novice import KernelNovice
-from lira.fusion.learning.learner import Learner
-from lira.fusion.learning.novice import NetworkNovice, Novice, Trainer
+from lira.fusion.learning.novice import Novice, Trainer
 from lira.fusion.methods.base import Expert, Method, Policy
 from lira.fusion.methods.context import Context, Trunks
 from lira.fusion.methods.presets import Preset
-from lira.fusion.policies.ensemble import EnsembleNet
-from lira.fusion.policies.networks import FusionNet
 from lira.fusion.teaching.teacher import ScriptedTeacher, TeacherSettings
 from lira.hal.errors import ConfigError
 from lira.hal.messages import Driver
@@ -26,7 +24,10 @@ from lira.sim_backend.foresight import Foresight
 from lira.sim_backend.world import World
 from lira.tools.runs.warm_start import warm_up
 
-NewTrainer = Callable[[Learner], Trainer]
+if TYPE_CHECKING:
+    from lira.fusion.learning.learner import Learner
+
+NewTrainer = Callable[["Learner"], Trainer]
 
 
 def build_method(
@@ -57,12 +58,12 @@ def build_method(
         if preset.kernel is not None:
             novice = KernelNovice(KernelNet.from_experts(sees), learning, preset.kernel, mirrored=preset.mirrored)
         else:
+            from lira.tools.runs.network_novice import network_novice  # torch, which a regression does without
+
             frozen = (trunks or preset.trunks) == "frozen"
-            network = FusionNet.from_experts(sees, frozen=frozen, seed=seed)
-            if ensemble:
-                network = EnsembleNet(network, ensemble, seed)
-            learner = Learner(network, seed=seed, frozen_trunks=frozen, mirrored=preset.mirrored)
-            novice = NetworkNovice(network.driving(), trainer(learner), learning)
+            novice = network_novice(
+                sees, learning, trainer, seed, frozen=frozen, mirrored=preset.mirrored, ensemble=ensemble
+            )
         warm_up(novice, preset.warm, profile, pair)
         return novice
 

@@ -6,13 +6,13 @@ from pathlib import Path
 
 import msgspec
 import numpy as np
-import torch
 
 from lira.fusion.control import ControlLoop
 from lira.fusion.experts.files import experts_of, folder_of, seeded
 from lira.fusion.experts.tasks import DEFAULT, TASKS
 from lira.fusion.inference.checkpoint import Checkpoint, save_checkpoint
 from lira.fusion.inference.networks import DrivingNet
+from lira.fusion.inference.threads import one_thread
 from lira.fusion.learning.learner import Learner
 from lira.fusion.learning.novice import LearningSettings, NetworkNovice
 from lira.fusion.learning.trainer import InlineTrainer
@@ -38,7 +38,7 @@ BLIND_HZ = 0.01
 
 def train_expert(kind: str, task: str, profile: RobotProfile, seed: int, path: Path, command: str) -> bool:
     """Train the expert that a task has for one sensor, and save it to `path` if it passes. Returns whether it did."""
-    torch.set_num_threads(1)
+    one_thread()
     course = curriculum(kind, task)
     world = load_world(course.world)
     sees = next(row for row in modalities_of(profile) if row.sensor == kind)

@@ -87,10 +87,7 @@ def teach(
     own. Then the novice drives `unseen` layouts alone. `folder` keeps labels, record and novice. `say` gets a line for
     each lap. Raises `ConfigError`, for a robot that is no twin too, and `PluginError`.
     """
-    import torch
-
-    torch.set_num_threads(1)  # a result should not depend on the number of cores
-    one_thread()
+    one_thread()  # a result should not depend on the number of cores
     arena = robot.arena
     if arena is None:
         raise ConfigError("only a twin has laps to teach on", "With a person as teacher: lira fusion --method.")

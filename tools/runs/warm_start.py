@@ -6,7 +6,7 @@ from functools import cache
 from lira.fusion.control import ControlLoop
 from lira.fusion.experts.load import load_policy
 from lira.fusion.experts.tasks import DEFAULT, TASKS
-from lira.fusion.learning.learner import Label
+from lira.fusion.learning.labels import Label
 from lira.fusion.learning.novice import Novice, is_redundant
 from lira.fusion.methods.base import Alone
 from lira.fusion.preprocess import Features

@@ -8,13 +8,17 @@ each step that a person drives is judged with the novice that had not learned it
 noise on the person's commands is left out: nothing here changes what a hand commands.
 """
 
+from typing import TYPE_CHECKING
+
 from lira.fusion.learning.novice import Novice
 from lira.fusion.methods.base import Method, Proposal
 from lira.fusion.methods.context import Context, MethodSettings
 from lira.fusion.methods.rivals.gated import RobotGated, discrepancy
-from lira.fusion.methods.rivals.probe import Probe
 from lira.fusion.preprocess import Features
 from lira.hal.messages import Action
+
+if TYPE_CHECKING:
+    from lira.fusion.methods.rivals.probe import Probe
 
 
 class LazyDaggerSettings(MethodSettings, frozen=True, tag="lazy-dagger"):
@@ -28,13 +32,15 @@ class LazyDaggerSettings(MethodSettings, frozen=True, tag="lazy-dagger"):
 
     def build(self, context: Context) -> Method:
         """Teach a novice with a classifier beside it."""
+        from lira.fusion.methods.rivals.probe import Probe
+
         return LazyDagger(context.novice(), Probe(context.seed), self)
 
 
 class LazyDagger(RobotGated):
     """The person drives from where the novice is expected to differ until it does not."""
 
-    def __init__(self, novice: Novice, f: Probe, settings: LazyDaggerSettings) -> None:
+    def __init__(self, novice: Novice, f: "Probe", settings: LazyDaggerSettings) -> None:
         self._f, self._settings = f, settings
         self._seen = 0
         super().__init__(novice)

@@ -15,6 +15,7 @@ short, so that the sums are learned as they came (Monte Carlo) instead of by tem
 import math
 from collections import deque
 from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -23,9 +24,11 @@ from lira.fusion.methods.base import Method, Proposal
 from lira.fusion.methods.context import Context, MethodSettings
 from lira.fusion.methods.doubt import Doubt, doubt_of
 from lira.fusion.methods.rivals.gated import RobotGated, discrepancy
-from lira.fusion.methods.rivals.probe import Probe
 from lira.fusion.preprocess import Features
 from lira.hal.messages import Action
+
+if TYPE_CHECKING:
+    from lira.fusion.methods.rivals.probe import Probe
 
 KNOWN = 50  # steps of the robot's before a quantile is one
 
@@ -43,6 +46,8 @@ class ThriftyDaggerSettings(MethodSettings, frozen=True, tag="thrifty-dagger"):
 
     def build(self, context: Context) -> Method:
         """Teach a novice that can doubt, with a critic beside it. Raises `ConfigError` for one that cannot doubt."""
+        from lira.fusion.methods.rivals.probe import Probe
+
         novice = context.novice(ensemble=self.ensemble)
         return ThriftyDagger(novice, doubt_of(novice), Probe(context.seed), self)
 
@@ -50,7 +55,7 @@ class ThriftyDaggerSettings(MethodSettings, frozen=True, tag="thrifty-dagger"):
 class ThriftyDagger(RobotGated):
     """The person drives where the novice is out of its depth, but no more often than the budget says."""
 
-    def __init__(self, novice: Novice, novelty: Doubt, risk: Probe, settings: ThriftyDaggerSettings) -> None:
+    def __init__(self, novice: Novice, novelty: Doubt, risk: "Probe", settings: ThriftyDaggerSettings) -> None:
         self._novelty, self._risk, self._settings = novelty, risk, settings
         self._met: deque[tuple[float, float]] = deque(maxlen=settings.window)  # novelty and risk of the robot's steps
         self._stretch: list[tuple[Features, Action]] = []  # the robot's steps since a person drove

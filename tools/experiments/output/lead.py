@@ -27,10 +27,10 @@ lira experiment results             # these pages alone, from the summaries that
 NOT_YET = "\nThe experiment `unseen` has not been played yet: `lira experiment unseen --seeds 10`.\n"
 EFFORT = """
 After each training lap the novice alone drives 12 fresh layouts. Effort to 90 % is what a method had taken when 11 of
-them were passed; who did not get there within the cap of laps is censored, and counts with what it had used. Unseen:
-12 other layouts a run, which decided nothing, driven by the novice that had just reached 90 %, without any protection.
-Ratios are the method's effort over that of `plus`, pair by pair of one seed: medians, 95 % bootstrap intervals; labels
-without and with the demonstration, which is all that cloning takes.
+them were passed; who did not get there within the cap of laps (12, or `--laps`) is censored, and counts with what it
+had used. Unseen: 12 other layouts a run, which decided nothing, driven by the novice that had just reached 90 %,
+without any protection. Ratios are the method's effort over that of `plus`, pair by pair of one seed: medians, 95 %
+bootstrap intervals; labels without and with the demonstration, which is all that cloning takes.
 """
 DEPLOYED = """
 The same novices on the same 12 layouts, as they are, behind the protective field, behind the shield, and with somebody

@@ -2,9 +2,9 @@
 
 After each training lap every method's novice drives 12 fresh layouts alone: a point of its curve. Its effort to 90 % is
 what it had taken when it passed 11 of them, to 97 % when it passed all 12; who does not get there within the cap of
-laps is censored. Then 12 other layouts, which decided nothing, say what that is worth. How a method is taught is its
-own: on one layout as in the thesis (hold, hg-dagger), or each lap on a fresh one (plus, -fresh, -kernel). The rivals
-with the novice of plus tell what the experts bring apart from what the learner brings.
+laps (12, or `--laps`) is censored. Then 12 other layouts, which decided nothing, say what that is worth. How a method
+is taught is its own: on one layout as in the thesis (hold, hg-dagger), or each lap on a fresh one (plus, -fresh,
+-kernel). The rivals with the novice of plus tell what the experts bring apart from what the learner brings.
 """
 
 from functools import partial
@@ -29,7 +29,7 @@ from lira.tools.experiments.quality import Quality
 from lira.tools.experiments.trial import Outcome, Trial
 
 WORLD = "line-obstacles"
-LAPS = 6
+LAPS = 12  # the cap: who is cut off counts with less than the whole effort, so it lies well above what most take
 TO = Quality(ways=("plain", "shield"))
 BASE = "plus"
 USUAL = (BASE, "hold", "hg-dagger", "hg-dagger-kernel")

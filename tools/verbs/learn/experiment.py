@@ -24,7 +24,7 @@ from typing import TYPE_CHECKING
 
 from lira.hal.errors import ConfigError
 from lira.tools.experiments.registry import REGISTRY, load, words_of
-from lira.tools.options import add_json, natural
+from lira.tools.options import add_json, add_randomise, natural, positive
 
 if TYPE_CHECKING:
     from lira.tools.experiments.output.summary import Summary
@@ -38,7 +38,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     names = "; ".join(f"{name}: {entry.words}" for name, entry in REGISTRY.items()).replace("%", "%%")
     add = parser.add_argument
     add("name", metavar="NAME", help=f"{names}; {ALL}; {RESULTS}; or one of your own: MODULE:OBJECT")
-    add("--seeds", type=int, default=3, help="repetitions, seeds 0, 1, 2, ... (default: %(default)s)")
+    add("--seeds", type=positive, default=3, help="repetitions, seeds 0, 1, 2, ... (default: %(default)s)")
     add("--first-seed", type=natural, default=0, help="begin with this seed instead of 0")
     add(
         "--methods",
@@ -66,9 +66,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="of unseen: what is other where the novice is tried than where it was taught: gray, boxes, curvature, "
         "noise, camera or slip",
     )
+    add_randomise(parser, "of unseen: while it is taught, ")
     add("--ways", help="of unseen: how novices are tried: plain, field, shield, ask (default: plain,shield)")
+    add("--laps", type=positive, help="of unseen: who is no better after so many laps is censored (default: 12)")
     add("--more", type=natural, default=0, help="of unseen: teach on for so many laps, to see whether that spoils it")
-    add("--workers", type=int, default=1, help="processes side by side (default: %(default)s)")
+    add("--workers", type=positive, default=1, help="processes side by side (default: %(default)s)")
     add("--scheduler", metavar="ADDRESS", help="run on this Dask cluster instead, like tcp://192.168.1.5:8786")
     add("--run", type=Path, default=FOLDER, metavar="DIR", help="keeps the trials and pages (default: %(default)s)")
     add_json(parser)
@@ -86,8 +88,6 @@ def run(args: argparse.Namespace) -> int:
     from lira.tools.experiments.output.summary import to_json
     from lira.tools.output.machine import take_stdout, write_file
 
-    if args.seeds < 1 or args.workers < 1:
-        raise ConfigError("--seeds and --workers are at least 1", "Give a positive number.")
     if args.name in (ALL, RESULTS):
         return write_results(args)
     output = take_stdout() if args.json == "-" else None
@@ -122,6 +122,8 @@ def play(args: argparse.Namespace, name: str) -> "tuple[Summary, Path]":
         world=args.world,
         teacher=args.teacher,
         shift=args.shift,
+        randomised=args.randomise,
+        laps=args.laps,
         more=args.more,
         ways=tuple(args.ways.split(",")) if args.ways else (),
         all_experiments=args.name == ALL,

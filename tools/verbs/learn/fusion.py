@@ -91,15 +91,14 @@ def add_teaching(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Learn until done or told to stop. Exit status 1 if the novice did not drive alone as it should."""
-    import torch
-
     from lira.fusion.inference.threads import one_thread
     from lira.hal.client.remote import connect
+    from lira.tools.cli import require
 
     plan = plan_of(args)
+    require(*plan.preset.packages)
     if not plan.preset.approach.learns and args.teacher == "none":
         raise ConfigError(f"by the method '{args.method}' nobody learns", "Show it on a twin with --teacher perfect.")
-    torch.set_num_threads(1)
     one_thread()
     with connect(args.connect, args.name, close_s=CLOSE_S) as robot:
         if args.teacher == "none":

@@ -22,7 +22,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from lira.hal.errors import ConfigError
-from lira.tools.options import add_layout, add_profile, add_seed, add_server, add_world
+from lira.tools.options import add_layout, add_profile, add_randomise, add_seed, add_server, add_world
 from lira.tools.ros2.graph import add_graph, offered
 
 if TYPE_CHECKING:
@@ -47,6 +47,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_server(parser)
     add_graph(parser)
     add_layout(parser, "which random layout of the world's boxes")
+    add_randomise(parser)
     add_seed(parser, "seeds the sensors' noise")
     pace = parser.add_mutually_exclusive_group()
     pace.add_argument("--speed", type=float, default=1.0, metavar="X", help="times real time (default: %(default)g)")
@@ -79,11 +80,15 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Serve until told to stop."""
+    from msgspec.structs import replace
+
     from lira.hal.profile import load_profile
     from lira.sim_backend.catalogue import load_world
 
     # What is wrong with the words is said at once, before anything heavy is loaded.
     profile, world = load_profile(args.profile), load_world(args.world)
+    if args.randomise:
+        world = replace(world, randomised=True)
 
     if args.arena is not None and args.wire is None:
         raise ConfigError("--arena goes with --wire", "A twin that is a robot on the bus tells the truth there.")

@@ -11,6 +11,7 @@ examples:
   lira demo --world passage
   lira demo --method hold --proof own --layouts own      as in the thesis
   lira demo --expert mylab.experts:wall      a third expert, of your own
+  lira demo --world corridor --randomise     for a robot elsewhere: see `lira twin --wire`, `lira robot`, `lira drive`
   lira demo --wire        the drivers of the real robot in between, byte by byte; in real time
 
 exit status: 0 if the novice was proven within its laps and then passed every unseen layout, without a collision and
@@ -23,20 +24,17 @@ import sys
 import time
 from collections.abc import Sequence
 from datetime import datetime
-from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from lira.hal.errors import ConfigError, MissingExtraError
+from lira.hal.errors import ConfigError
 from lira.hal.messages import Phase
-from lira.tools.options import add_expert, add_layout, add_protocol, add_record, add_seed, natural
+from lira.tools.options import add_expert, add_layout, add_protocol, add_randomise, add_record, add_seed, natural
 
 if TYPE_CHECKING:
     from lira.tools.launch.launch import Part
     from lira.tools.launch.processes import ChildProcess
 
-NEEDED = {"torch": "learn"}  # and the extras that bring it
-NEEDED_BY_WIRE = {"serial": "robot"}
 POLL_S = 0.1
 STALL_S = 60.0
 
@@ -64,6 +62,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         choices=("sketch", "tiny", "egl"),
         help="what draws and measures the world, as in `lira twin` (default: sketch, if there is no mesh in it)",
     )
+    add_randomise(parser)
     add_record(parser)
     add("--run", type=Path, metavar="DIR", help="folder of the run (default: runs/demo-<date-time>)")
 
@@ -72,8 +71,10 @@ def run(args: argparse.Namespace) -> int:
     """Run the demo from start to report."""
     from lira.fusion.experts.files import expert_path, experts_of
     from lira.fusion.experts.tasks import TASKS, task_of
+    from lira.fusion.methods.presets import method_named
     from lira.hal.profile import load_profile
     from lira.sim_backend.catalogue import load_world
+    from lira.tools.cli import require
     from lira.tools.launch.launch import direct, twin_words, wired
     from lira.tools.launch.processes import free_port, lira_command
 
@@ -85,20 +86,18 @@ def run(args: argparse.Namespace) -> int:
     profile = load_profile(robot)
     for expert in experts_of(profile):
         expert_path(expert, profile, task)
-    for package, extra in {**NEEDED, **(NEEDED_BY_WIRE if args.wire else {})}.items():
-        if find_spec(package) is None:
-            raise MissingExtraError(package, extra)
+    preset = method_named(args.method).taught(layouts=args.layouts, proof=args.proof)
+    require("safetensors", *preset.packages, *(["serial"] if args.wire else []))
     from lira.fusion.experts.load import load_policy  # not sooner: it takes the learner's libraries
-    from lira.fusion.methods.presets import method_named
 
-    method_named(args.method).taught(layouts=args.layouts, proof=args.proof)
     for expert in args.expert:
         load_policy(expert, profile)
     folder: Path = args.run or Path("runs") / f"demo-{datetime.now():%Y%m%d-%H%M%S}"
     port = free_port()
     name, endpoint = f"demo_{port}", f"127.0.0.1:{port}"
     both = ["--layout", str(args.layout), "--seed", str(args.seed)]
-    twin = [*twin_words(world, robot, args.seed, args.renderer), "--layout", str(args.layout)]
+    twin = twin_words(world, robot, args.seed, args.renderer, randomise=args.randomise)
+    twin += ["--layout", str(args.layout)]
     fusion = [*both, "--name", name, "--connect", endpoint, "--method", args.method, "--teacher", "scripted"]
     fusion += ["--run", str(folder), "--train-laps", str(args.laps), "--unseen", str(args.unseen)]
     fusion += ["--layouts", args.layouts, "--proof", args.proof]

@@ -33,15 +33,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Hold blocks, or analyse them."""
-    import torch
-
     from lira.fusion.inference.threads import one_thread
     from lira.tools.cli import main
     from lira.tools.runs.reach import say
     from lira.tools.study.conduct import Study
     from lira.tools.study.plan import load_plan
 
-    torch.set_num_threads(1)
     one_thread()
     folder: Path = args.to or Path("runs") / f"study-{args.plan.stem}{'-dry' if args.dry_run else ''}"
     study = Study(load_plan(args.plan), folder, say)

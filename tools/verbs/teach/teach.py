@@ -90,10 +90,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Hold the session, and leave a report."""
-    import torch
-
     from lira.fusion.inference.threads import one_thread
     from lira.hal.client.remote import connect
+    from lira.tools.cli import require
     from lira.tools.launch.lifetime import CLOSE_S
     from lira.tools.live.rules import Rules
     from lira.tools.live.sitting import sit
@@ -103,7 +102,7 @@ def run(args: argparse.Namespace) -> int:
     args.run = args.run or Path("runs") / f"teach-{args.who}-{datetime.now():%Y%m%d-%H%M%S}"
     args.laps = args.laps or (SCRIPT_LAPS if scripted else LAPS)
     plan = plan_of(args)
-    torch.set_num_threads(1)
+    require(*plan.preset.packages)
     one_thread()
     args.speed = args.speed or (SCRIPT_SPEED if scripted else 1.0)
     practice_s = args.practice if args.practice is not None else 2.0 if scripted else 15.0
