@@ -82,7 +82,23 @@ def test_a_label_that_all_others_contradict_is_named_with_who_gave_it():
     (found,) = learner.set_aside()
     assert (found.number, found.source, found.action) == (5, "camera", (1.0, -0.9))
     assert found.others == pytest.approx((1.0, 0.9), abs=0.1)
+    assert not found.mirrored
     assert novice().set_aside() == []
+
+
+def test_of_a_label_that_is_set_aside_it_is_said_whether_itself_or_its_mirror_image():
+    learner = novice(mirrored=True)
+    for _ in range(5):
+        learner.remember(Label(seen(0).mirrored(), (1.0, 0.9), "human"))
+    learner.remember(Label(seen(0), (1.0, 0.9), "camera"))  # the others say -0.9 here, by their mirror images
+    (found,) = learner.set_aside()
+    assert not found.mirrored
+    ridge = learner.ridge
+    assert ridge.aside == {5: 10}
+    assert not ridge.fit.used[10:].any()
+    ridge.fit.used[10] = True  # as where little else is known of what was seen than of its mirror image
+    (found,) = learner.set_aside()
+    assert (found.number, found.action, found.mirrored) == (5, (1.0, 0.9), True)
 
 
 @pytest.mark.parametrize("mirrored", [True, False])
