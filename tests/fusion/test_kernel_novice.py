@@ -143,6 +143,15 @@ def test_alone_it_turns_more_than_while_it_is_taught():
     assert abs(alone[1]) > abs(angular)
 
 
+@pytest.mark.parametrize("proving", [False, True])
+def test_several_states_at_once_are_answered_as_one_by_one(proving):
+    learner, other = taught(), taught()
+    states = [seen(i) for i in range(5)]
+    one_by_one = [(other.proving if proving else other.alone)(each) for each in states]
+    np.testing.assert_allclose(learner.together(proving=proving)(states), one_by_one, atol=1e-5)
+    assert learner.limit == pytest.approx(other.limit, rel=1e-4)
+
+
 def test_it_knows_what_is_unlike_what_the_human_had_to_show_it():
     learner = novice(mirrored=False)
     assert not learner.knows(seen(0), 0.25)  # before any human
