@@ -32,6 +32,17 @@ def seeded(pair: str) -> tuple[str, int] | None:
     return task, int(seed)
 
 
+def check_pair(pair: str) -> None:
+    """Raise `ConfigError` for what is no pair of any robot: no task, no TASK@SEED, and no folder with an expert."""
+    if pair in TASKS or seeded(pair) is not None:
+        return
+    if not any((Path(pair) / f"{name}.safetensors").is_file() for name in EXPERTS):
+        remedy = (
+            f"Give a folder with camera.safetensors and lidar.safetensors, a task ({', '.join(TASKS)}), or TASK@SEED."
+        )
+        raise ConfigError(f"there are no experts in {pair}", remedy)
+
+
 def folder_of(pair: str) -> Path:
     """Where the files of a pair lie that does not come with the project. Raises `ConfigError`."""
     found = seeded(pair)

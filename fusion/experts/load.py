@@ -2,14 +2,15 @@
 
 import math
 import re
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import replace
+from pathlib import Path
 from typing import cast
 
 import numpy as np
 
 from lira.fusion.experts.files import EXPERTS as NAMES
-from lira.fusion.experts.files import expert_path
+from lira.fusion.experts.files import check_pair, expert_path
 from lira.fusion.experts.tasks import DEFAULT
 from lira.fusion.inference.checkpoint import Checkpoint, load_checkpoint
 from lira.fusion.inference.kernel_net import KernelNet
@@ -22,6 +23,9 @@ from lira.hal.errors import ConfigError, PluginError
 from lira.hal.messages import Action
 from lira.hal.plugins import EXPERTS
 from lira.hal.profile import RobotProfile
+
+SUFFIX = ".safetensors"
+SHIPPED = {f"{name}-expert": name for name in NAMES}
 
 
 def load_network(name_or_path: str, profile: RobotProfile, pair: str = DEFAULT) -> tuple[DrivingNet, Checkpoint]:
@@ -45,6 +49,15 @@ def _sizes(shapes: Mapping[str, Shape]) -> str:
 def as_expert(name: str, network: DrivingNet, cruise: Action | None) -> Expert:
     """Wrap a network as a black box."""
     return Expert(name, network.act) if cruise is None else Expert(name, network.act, cruise)
+
+
+def check_named(policies: Iterable[str | Expert | Policy], pair: str | None = None) -> None:
+    """Raise what loading these would raise whatever the robot: before one is looked for, or anything is started."""
+    if pair is not None:
+        check_pair(pair)
+    for given in policies:
+        if isinstance(given, str):
+            _ = load_checkpoint(Path(given)) if given.endswith(SUFFIX) else EXPERTS.find(given, SHIPPED)
 
 
 def load_policy(given: str | Expert | Policy, profile: RobotProfile, pair: str = DEFAULT) -> Expert:
@@ -82,8 +95,8 @@ def _load(given: str | Expert | Policy, profile: RobotProfile, pair: str) -> tup
     if not isinstance(given, str):
         names = (getattr(given, "name", None), getattr(given, "__name__", None), type(given).__name__)
         return own_expert(given, next(str(name) for name in names if name), profile), None
-    if not given.endswith(".safetensors"):
-        found = EXPERTS.find(given, {f"{name}-expert": name for name in NAMES})
+    if not given.endswith(SUFFIX):
+        found = EXPERTS.find(given, SHIPPED)
         if found not in NAMES:
             return own_expert(found, given, profile), None
     network, checkpoint = load_network(given, profile, pair)

@@ -74,7 +74,8 @@ def load_checkpoint(path: Path) -> tuple[DrivingNet, Checkpoint]:
     Its shapes are compared with what it says of itself before a network is built or a weight is read.
     """
     if not path.exists():
-        raise StorageError(f"there is no checkpoint {path}", "Check the path, or make one with 'lira train-expert'.")
+        remedy = "A novice is novice.safetensors in the folder of its run; 'lira train-expert' makes an expert."
+        raise StorageError(f"there is no checkpoint {path}", remedy)
     remedy = "Restore the file, or make it anew with the command that made it."
     _check_size(path)
     try:

@@ -1,4 +1,4 @@
-"""Rows of one shape that may outgrow the memory: the first ones in an array, the others in a file."""
+"""Rows of one shape that may outgrow the memory, in a file."""
 
 import errno
 import os
@@ -11,31 +11,6 @@ import numpy as np
 import torch
 from numpy.typing import NDArray
 from torch import Tensor
-
-
-class Rows:
-    """Rows in one array that doubles when it is full; `rows` is the filled part."""
-
-    def __init__(self, shape: tuple[int, ...], dtype: torch.dtype) -> None:
-        self._data = torch.empty((64, *shape), dtype=dtype)
-        self.count = 0
-
-    @property
-    def rows(self) -> Tensor:
-        """All rows so far."""
-        return self._data[: self.count]
-
-    @property
-    def row_bytes(self) -> int:
-        """Size of one row."""
-        return self._data[0].nbytes
-
-    def append(self, row: Tensor) -> None:
-        """Add a row."""
-        if self.count == len(self._data):
-            self._data = torch.cat([self._data, torch.empty_like(self._data)])
-        self._data[self.count] = row
-        self.count += 1
 
 
 class FileRows:

@@ -12,9 +12,10 @@ from torch import Tensor, nn
 from lira.fusion.inference.architecture import Weights
 from lira.fusion.learning.adam import Adam
 from lira.fusion.learning.heads import Heads
-from lira.fusion.learning.label_store import FileRows, Rows
+from lira.fusion.learning.label_store import FileRows
 from lira.fusion.learning.labels import Label, mirror
 from lira.fusion.policies.ensemble import EnsembleNet
+from lira.fusion.policies.growing import Rows
 from lira.fusion.policies.networks import Inputs, Network, PictureTrunk, ScanTrunk, batch_of_one
 from lira.fusion.preprocess import MODALITIES
 
@@ -59,10 +60,10 @@ class Learner:
         self._random = np.random.default_rng(seed)
         self._bootstrap = np.random.default_rng([seed, BOOTSTRAP])
         self._resident_bytes = resident_bytes
-        self._inputs: dict[str, Rows] = {}
+        self._inputs: dict[str, Rows[Any]] = {}
         self._spilled: FileRows | None = None
         self._members = self._network.members if isinstance(self._network, EnsembleNet) else 0
-        self._targets = Rows((3 + self._members,), torch.float32)  # linear, angular, weight, times for each member
+        self._targets = Rows((3 + self._members,), np.float32)  # linear, angular, weight, times for each member
         self._learning_rate = learning_rate
 
     def __len__(self) -> int:
@@ -130,15 +131,14 @@ class Learner:
         else:
             self._keep_in_memory(label, kept)
         times = self._bootstrap.poisson(1.0, self._members) if self._members else ()
-        self._targets.append(torch.tensor([*label.action, label.weight, *times]))
+        self._targets.append([*label.action, label.weight, *times])
 
     def _keep_in_memory(self, label: Label, kept: dict[str, NDArray[Any]]) -> None:
+        rows = kept
         if self._frozen_trunks:
-            rows = {TRUNKS: self._frozen_features(batch_of_one(label.features))[0]}
-        else:
-            rows = {name: torch.from_numpy(array) for name, array in kept.items()}
+            rows = {TRUNKS: self._frozen_features(batch_of_one(label.features))[0].numpy()}
         if not self._inputs:
-            self._inputs = {name: Rows(tuple(row.shape), row.dtype) for name, row in rows.items()}
+            self._inputs = {name: Rows(row.shape, row.dtype) for name, row in rows.items()}
         for name, store in self._inputs.items():
             store.append(rows[name])
         if (self._resident + 1) * sum(store.row_bytes for store in self._inputs.values()) > self._resident_bytes:
@@ -147,7 +147,7 @@ class Learner:
     def _update(self, pick: Tensor) -> Tensor:
         """Go one step down the mean squared error of some labels, and return it."""
         features = self._features(pick)
-        seen, targets = features.detach(), self._targets.rows.index_select(0, pick)
+        seen, targets = features.detach(), _picked(self._targets, pick)
         actions, weights = targets[:, :2], targets[:, 2:3]
         losses, slope = self._heads.descend(seen, actions, weights[None])
         if self._trunks:
@@ -163,10 +163,10 @@ class Learner:
     def _features(self, pick: Tensor) -> Tensor:
         """Trunk output of some labels [n, size], from wherever they are kept."""
         if self._spilled is None:
-            kept = {name: store.rows.index_select(0, pick) for name, store in self._inputs.items()}
+            kept = {name: _picked(store, pick) for name, store in self._inputs.items()}
             return kept[TRUNKS] if self._frozen_trunks else self._network.features(_scaled(kept))
         near = pick < self._resident
-        kept = {name: store.rows[pick[near]] for name, store in self._inputs.items()}
+        kept = {name: _picked(store, pick[near]) for name, store in self._inputs.items()}
         far = self._spilled.read((pick[~near] - self._resident).tolist())
         if not self._frozen_trunks:
             both = {name: torch.cat([array, far[name]]) for name, array in kept.items()}
@@ -184,6 +184,11 @@ class Learner:
     def _frozen_features(self, inputs: Inputs) -> Tensor:
         with torch.no_grad():
             return self._network.features(inputs)
+
+
+def _picked(store: Rows[Any], pick: Tensor) -> Tensor:
+    """Some of the rows."""
+    return torch.from_numpy(store.rows).index_select(0, pick)
 
 
 def _scaled(kept: Inputs) -> dict[str, Tensor]:

@@ -24,7 +24,7 @@ from lira.fusion.methods.rivals.lazy_dagger import LazyDaggerSettings
 from lira.fusion.methods.rivals.switching import SwitchingSettings
 from lira.fusion.methods.rivals.thrifty_dagger import ThriftyDaggerSettings
 from lira.fusion.methods.shared_feedback import SharingSettings
-from lira.fusion.methods.syllabus import FRESH, THESIS, Syllabus
+from lira.fusion.methods.syllabus import FRESH, THESIS, Syllabus, with_proof
 from lira.fusion.policies.kernel import KernelSettings
 from lira.hal.errors import ConfigError, PluginError
 from lira.hal.messages import Phase
@@ -95,13 +95,35 @@ class Preset(msgspec.Struct, frozen=True):
         return self.approach.kind
 
     @property
-    def trains(self) -> bool:
-        """Whether its novice is a network, which torch trains; of a method of somebody's own nobody knows."""
-        return self.kernel is None and not isinstance(self.approach, OwnSettings | SwitchingSettings)
+    def packages(self) -> tuple[str, ...]:
+        """What has to be installed to teach by it: torch, where a network is trained. A method of one's own may ask."""
+        if isinstance(self.approach, OwnSettings | SwitchingSettings):
+            return ()
+        probes = isinstance(self.approach, LazyDaggerSettings | ThriftyDaggerSettings)
+        return ("torch",) if self.kernel is None or probes else ()
 
     def starting(self, who: str) -> "Preset":
         """Return the same with another driver before the first training step. Raises `ConfigError`."""
         return msgspec.structs.replace(self, approach=self.approach.starting(who))
+
+    def taught(
+        self,
+        *,
+        start: str | None = None,
+        layouts: str | None = None,
+        proof: str | None = None,
+        idle_frames: str | None = None,
+    ) -> "Preset":
+        """Return the same as a run teaches it, in the words of a command line; None: as it is. Raises `ConfigError`."""
+        preset = self if start is None else self.starting(start)
+        syllabus = preset.syllabus if proof is None else with_proof(preset.syllabus, proof)
+        own = {"layouts": layouts} if layouts is not None else {}
+        idle = {"idle_frames": idle_frames} if idle_frames is not None else {}
+        return msgspec.structs.replace(
+            preset,
+            learning=msgspec.structs.replace(preset.learning, **idle),
+            syllabus=msgspec.structs.replace(syllabus, **own),
+        )
 
     def build(self, context: Context) -> Method:
         """Build the method from what a run has to offer. Raises `ConfigError` or `PluginError`."""

@@ -29,12 +29,11 @@ worst one leaves the fit, an expert's before a human's.
 
 Sources: Rasmussen & Williams, Gaussian Processes for Machine Learning (2006), eq. 2.25, 2.26 and section 5.4.2 (eq.
 5.10 to 5.12); leaving a group out: Hager (1989), Updating the Inverse of a Matrix. Appending a row or taking one out
-changes P by O(n^2) work, so it is done between two steps.
+changes P by O(n^2) work and in its place, so it is done between two steps.
 
 k itself, and the novice as it drives when nobody teaches it any more, are in `inference/kernel_net.py`.
 """
 
-import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
@@ -43,6 +42,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lira.fusion.inference.kernel_net import Doubles, kernel, parts
+from lira.fusion.policies.growing import Rows, Square
 from lira.hal.config import Table
 from lira.hal.messages import FloatArray
 
@@ -66,29 +66,29 @@ class KernelSettings(Table, frozen=True):
 
 @dataclass(frozen=True)
 class Fit:
-    """The regression on some examples: P [n, n] with zero rows for what is set aside, Y [n, 2], both float64."""
+    """The regression on some examples: P [n, n] with zero rows for what is set aside, Y [n, 2], both float64.
+
+    It looks at what the regression is kept in, and so is good until the next example.
+    """
 
     p: Doubles
     y: Doubles
+    a: Doubles  # A [n, 2]
     noise: Doubles  # the diagonal of N [n]
     used: Flags  # [n]
     human: Flags  # [n]
     groups: Numbers  # [n]
 
-    @cached_property
-    def a(self) -> Doubles:
-        """A [n, 2]."""
-        product: Doubles = self.p @ self.y
-        return product
-
     def mean(self, k: Doubles) -> Doubles:
-        """m before it is clipped [2], of the kernel values k [n] of one state."""
+        """m before it is clipped [..., 2], of the kernel values k [..., n] of some states."""
         product: Doubles = k @ self.a
         return product
 
     def deviation(self, k: Doubles) -> Doubles:
-        """sd [2]."""
-        return self.scale * math.sqrt(max(0.0, 1.0 - float(k @ self.p @ k)))
+        """sd [..., 2]."""
+        variance = 1.0 - (k @ self.p * k).sum(axis=-1, keepdims=True)
+        sd: Doubles = self.scale * np.sqrt(np.maximum(0.0, variance))
+        return sd
 
     @cached_property
     def left_out(self) -> tuple[Doubles, Doubles]:
@@ -140,38 +140,77 @@ class KernelRidge:
         self._parts = parts(tuple(sizes.values()))
         self.lengths = np.array([dict(settings.lengths).get(name, settings.length) for name in sizes])
         self._settings = settings
-        self.x: FloatArray = np.empty((0, sum(sizes.values())), np.float32)
-        self.y: Doubles = np.empty((0, 2))
-        self.w: Doubles = np.empty(0)
-        self.human: Flags = np.empty(0, np.bool_)
-        self.groups: Numbers = np.empty(0, np.int64)
-        self.labels: Numbers = np.empty(0, np.int64)  # which label each is an example of
-        self._p: Doubles = np.empty((0, 0))
+        self._x = Rows((sum(sizes.values()),), np.float32)
+        self._y = Rows((2,), np.float64)
+        self._w = Rows((), np.float64)
+        self._human = Rows((), np.bool_)
+        self._groups = Rows((), np.int64)
+        self._labels = Rows((), np.int64)
+        self._p = Square()
         self._fit: Fit | None = None
+        self._asked: tuple[FloatArray, Doubles] | None = None  # x and k(x) of the last state
 
     def __len__(self) -> int:
-        return len(self.y)
+        return self._y.count
+
+    @property
+    def x(self) -> FloatArray:
+        """Float32 [n, size]."""
+        return self._x.rows
+
+    @property
+    def y(self) -> Doubles:
+        """Y, float64 [n, 2]."""
+        return self._y.rows
+
+    @property
+    def w(self) -> Doubles:
+        """Weights, float64 [n]."""
+        return self._w.rows
+
+    @property
+    def human(self) -> Flags:
+        """Whether a human gave it [n]."""
+        return self._human.rows
+
+    @property
+    def groups(self) -> Numbers:
+        """Which group each belongs to [n]."""
+        return self._groups.rows
+
+    @property
+    def labels(self) -> Numbers:
+        """Which label each is an example of [n]."""
+        return self._labels.rows
 
     def k(self, x: FloatArray) -> Doubles:
-        """Kernel values of one state x [size] with all examples, float64 [n]."""
-        return kernel(self.x, x[None], self._parts, self.lengths**2)[:, 0]
+        """Kernel values of one state x [size] with all examples, float64 [n], or of several [m, size], [m, n].
+
+        Of the state that was asked about last they are known: a step asks for its action, its doubt and its label.
+        """
+        if x.ndim > 1:
+            return kernel(self.x, x, self._parts, self.lengths**2).T
+        if self._asked is None or not np.array_equal(x, self._asked[0]):
+            self._asked = x.copy(), kernel(self.x, x[None], self._parts, self.lengths**2)[:, 0]
+        return self._asked[1]
 
     def add(
         self, x: FloatArray, action: tuple[float, float], weight: float, *, human: bool, group: int, label: int
     ) -> None:
         """Append one example x [size] of a label: P is bordered (Schur complement). Of too many, one has to go."""
         k = self.k(x)
-        pk = self._p @ k
-        schur = 1.0 + self._settings.noise / weight - k @ pk
-        row = np.append(-pk, 1.0)
-        self._p = np.pad(self._p, (0, 1)) + np.outer(row, row) / schur
-        self.x = np.concatenate([self.x, x[None]])
-        self.y = np.concatenate([self.y, [action]])
-        self.w = np.append(self.w, weight)
-        self.human = np.append(self.human, human)
-        self.groups = np.append(self.groups, group)
-        self.labels = np.append(self.labels, label)
-        self._fit = None
+        p = self._p.values
+        pk = p @ k
+        schur = 1.0 + self._settings.noise / weight - float(k @ pk)
+        p += np.outer(pk, pk) / schur
+        self._p.border(-pk / schur, 1.0 / schur)
+        self._x.append(x)
+        self._y.append(action)
+        self._w.append(weight)
+        self._human.append(human)
+        self._groups.append(group)
+        self._labels.append(label)
+        self._fit = self._asked = None
         if len(self) > self._settings.most:
             self._forget()
 
@@ -180,11 +219,15 @@ class KernelRidge:
         """The regression without what contradicts the rest."""
         if self._fit is None:
             used = np.ones(len(self), np.bool_)
-            p = self._p.copy()
-            while (worst := self._contradiction(p, used)) is not None:
+            p, y = self._p.values, self.y
+            a = p @ y
+            while (worst := self._contradiction(p, a, used)) is not None:
+                if p is self._p.values:
+                    p = p.copy()
                 leave_out(p, worst)
                 used[worst] = False
-            self._fit = Fit(p, self.y, self._settings.noise / self.w, used, self.human, self.groups)
+                a = p @ y
+            self._fit = Fit(p, y, a, self._settings.noise / self.w, used, self.human, self.groups)
         return self._fit
 
     @property
@@ -207,34 +250,33 @@ class KernelRidge:
         """g, or what is set instead of it."""
         return self.fit.gain if self._settings.gain is None else self._settings.gain
 
-    def _contradiction(self, p: Doubles, used: Flags) -> int | None:
+    def _contradiction(self, p: Doubles, a: Doubles, used: Flags) -> int | None:
         """The example that is to be set aside next."""
         limit = self._settings.contradicts
         if limit is None or not used.any():
             return None
         residual = np.zeros(len(self))
-        residual[used] = np.abs((p[used] @ self.y[:, ANGULAR]) / p.diagonal()[used])
+        residual[used] = np.abs(a[used, ANGULAR] / p.diagonal()[used])
         experts = np.where(self.human, 0.0, residual)
         worst = experts if experts.max() > limit else residual
         return int(worst.argmax()) if worst.max() > limit else None
 
     def _forget(self) -> None:
         """Let the example go that the others say best, an expert's if there is any: the log still has it."""
-        residual = ((self._p @ self.y / self._p.diagonal()[:, None]) ** 2).sum(axis=1)
+        p = self._p.values
+        residual = ((p @ self.y / p.diagonal()[:, None]) ** 2).sum(axis=1)
         if not self.human.all():
             residual[self.human] = np.inf
         gone = int(residual.argmin())
-        leave_out(self._p, gone)
-        self._p = np.delete(np.delete(self._p, gone, 0), gone, 1)
-        self.x, self.y = np.delete(self.x, gone, 0), np.delete(self.y, gone, 0)
-        self.w, self.human = np.delete(self.w, gone), np.delete(self.human, gone)
-        self.groups, self.labels = np.delete(self.groups, gone), np.delete(self.labels, gone)
+        leave_out(p, gone)
+        for kept in (self._p, self._x, self._y, self._w, self._human, self._groups, self._labels):
+            kept.remove(gone)
 
 
 def leave_out(p: Doubles, i: int) -> None:
     """Turn P, in place, into that of all examples but i, whose row and column become zero."""
     row = p[i].copy()
-    p -= np.outer(row, row / row[i])
+    p -= np.outer(row, row) / row[i]
     p[i], p[:, i] = 0.0, 0.0
 
 

@@ -211,7 +211,7 @@ CLIENTS = {
     "person": (["fusion", "--method", "plus", "--paused", "--no-record", "--run", "{folder}/run"], "learns on"),
     "policy": (["drive", "camera-expert"], "drives '"),
     "console": (["console"], "console shows"),
-    "joystick": (["joystick"], "joystick drives"),
+    "joystick": (["joystick"], "joystick waits for a pad"),
 }
 
 

@@ -102,6 +102,22 @@ def test_it_knows_what_it_was_shown_and_stands_where_it_was_shown_nothing():
     assert known < 0.1 * unknown
 
 
+def test_several_states_are_asked_about_at_once_as_one_by_one():
+    x, ridge = states(20), taught(states(12), actions(12))
+    at_once = ridge.k(x)
+    np.testing.assert_allclose(at_once, [ridge.k(each) for each in x], atol=1e-5)
+    one_by_one = [ridge.fit.deviation(ridge.k(each)) for each in x]
+    np.testing.assert_allclose(ridge.fit.deviation(at_once), one_by_one, atol=1e-5)
+
+
+def test_what_is_known_of_a_state_is_forgotten_with_the_next_example():
+    x = states(3)
+    ridge = taught(x[:1], actions(1))
+    assert len(ridge.k(x[2])) == 1
+    ridge.add(x[1], (1.0, 0.0), 1.0, human=True, group=1, label=1)
+    np.testing.assert_array_equal(ridge.k(x[2]), kernel(ridge.x, x[2:], BOTH, WIDTHS)[:, 0])
+
+
 def test_before_any_label_it_stands():
     ridge = KernelRidge(SIZES, KernelSettings())
     assert ridge.act(states(1)[0], ridge.gain) == (0.0, 0.0)

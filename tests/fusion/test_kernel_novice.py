@@ -8,6 +8,7 @@ from nets import camera_net, lidar_net
 
 from lira.fusion.inference.checkpoint import Checkpoint, load_checkpoint, save_checkpoint
 from lira.fusion.inference.kernel_net import KernelNet
+from lira.fusion.learning import kernel_novice
 from lira.fusion.learning.kernel_novice import KernelNovice
 from lira.fusion.learning.labels import Label, mirror
 from lira.fusion.learning.novice import LearningSettings
@@ -150,7 +151,7 @@ class TestDoubt:
         assert not any(learner.doubts(seen(i)) for i in range(4))
         assert learner.doubts(self.FAR)
         assert learner.frozen().doubts(self.FAR)
-        assert not learner.frozen().doubts(seen(0))
+        assert not any(learner.frozen().doubts(seen(i)) for i in range(4))
 
     def test_before_it_was_proven_and_after_another_label_it_has_no_measure_of_doubt(self):
         assert not taught().doubts(self.FAR)
@@ -158,6 +159,13 @@ class TestDoubt:
         learner = self.proven()
         learner.remember(Label(seen(50), (1.0, 0.5), "human"))
         assert not learner.doubts(self.FAR)
+
+    def test_its_measure_is_that_of_every_state_it_met_however_many_are_taken_in_at_once(self, monkeypatch):
+        at_once = self.proven().limit
+        monkeypatch.setattr(kernel_novice, "MOST_MET", 3)
+        assert self.proven().limit == pytest.approx(at_once, rel=1e-9)
+        turns = [taught(12).deviation(seen(i))[1] for i in range(4)]
+        assert at_once == pytest.approx(max(turns), rel=1e-9)
 
     def test_what_it_does_does_not_depend_on_being_watched(self):
         learner = taught()

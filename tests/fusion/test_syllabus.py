@@ -2,6 +2,7 @@
 
 import pytest
 
+from lira.fusion.methods.presets import method_named
 from lira.fusion.methods.syllabus import FRESH, THESIS, Syllabus, with_proof
 from lira.hal.errors import ConfigError
 
@@ -41,3 +42,14 @@ def test_what_is_no_proof_is_refused_with_an_example(words):
     with pytest.raises(ConfigError) as error:
         with_proof(THESIS, words)
     assert "fresh:3" in error.value.remedy
+
+
+def test_a_preset_is_taught_as_the_words_of_a_verb_say_and_else_as_it_is():
+    plus = method_named("plus")
+    assert plus.taught() == plus
+    own = plus.taught(layouts="own", proof="own", idle_frames="skip")
+    assert (own.syllabus, own.learning.idle_frames) == (THESIS, "skip")
+    assert own.approach == plus.approach
+    with pytest.raises(ConfigError, match="is no proof"):
+        plus.taught(proof="fresh")
+    assert method_named("hold").taught(start="experts").approach.start == "experts"

@@ -9,10 +9,11 @@ from mcap_ros2.decoder import DecoderFactory
 from rosbags.rosbag2 import Reader
 from samples import BEGAN_NS, EPOCH, HEAD, OFFSET_NS, battery, drive, odom, picture, sample, write
 
-from lira.hal.bus.topics import BATTERY, CAMERA, ODOM, SCAN
+from lira.hal.bus.topics import BATTERY, CAMERA, DESCRIPTION, ODOM, SCAN
 from lira.hal.errors import StorageError
-from lira.hal.messages import Odometry
+from lira.hal.messages import Odometry, Text
 from lira.hal.messages.ros_types import TYPES
+from lira.tools.cli import main
 from lira.tools.recording.layout import FOLDER
 from lira.tools.recording.reader import Recording
 from lira.tools.recording.recover import recover
@@ -162,13 +163,14 @@ def test_a_recovered_recording_is_whole_for_everybody(tmp_path):
     write(folder, drive(5), close=False)
     assert not (folder / "metadata.yaml").exists()
     lines = list(recover(folder))
-    assert "mended, 402 messages" in lines[0]
+    assert "mended, 201 messages" in lines[0]
     recording = Recording(folder)
     assert as_heard(recording) == as_sent(drive(5))
     assert not recording.torn
     with Reader(folder) as reader:
         assert reader.topics["/rosbot/odom"].msgcount == 100
-    assert "whole" in next(recover(folder))
+    assert "whole, 201 messages" in next(recover(folder))
+    assert summarise(recording).count == 201
 
 
 # What it sums up to.
@@ -185,6 +187,18 @@ def test_a_summary_counts_by_topic_and_says_what_is_missing(tmp_path):
     assert (counted.count, counted.missing, counted.gap_s) == (5, 3, 4.0)
     assert counted.rate_hz == pytest.approx(4 / 7)
     assert summary.topics[CAMERA.key].missing is None
+
+
+def test_what_is_sent_once_is_said_to_be_so_and_not_to_be_missing(tmp_path, capsys):
+    numbers = [0, 1, 2, 6, 7]
+    answers = [sample(COUNTED, Odometry(1.0, 0.0, 0.0, 0.0, 0.0, 0.0), seq=n, sent_s=5.0 + n) for n in numbers]
+    described = sample(DESCRIPTION, Text("<robot/>"))
+    write(tmp_path / "rec", [battery(1.0), described, *answers, picture(9, 13.0), picture(10, 13.1)])
+    assert main(["info", str(tmp_path / "rec")]) == 0
+    rows = {line.split()[0]: line.split() for line in capsys.readouterr().out.splitlines() if "/msg/" in line}
+    assert rows[DESCRIPTION.key][3:] == ["once", "0", "kB", "none"]
+    assert rows["counted"][-1] == "3"
+    assert rows[CAMERA.key][-1] == "-"
 
 
 def test_what_the_recorder_lost_is_in_the_file(tmp_path):

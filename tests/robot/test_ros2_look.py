@@ -4,6 +4,7 @@ import argparse
 import re
 import shlex
 from contextlib import closing
+from dataclasses import replace
 
 import cv2
 import numpy as np
@@ -106,6 +107,31 @@ def test_what_announces_nothing_is_known_by_what_it_sends():
 def test_one_of_ours_needs_no_words_of_this_verb():
     sight = Sight(heard=(Heard("rover/scan", 10.0, 1, OURS, SCAN),))
     assert drives(sight) == "lira drive lidar-expert --connect rosbot:7447 --name rover"
+
+
+def test_what_ours_announces_to_bridges_makes_no_bridge_of_our_bus():
+    announced = routes(
+        (Kind.PUBLISHER, "rover/scan", SCAN),
+        (Kind.PUBLISHER, "rover/tf_static", "tf2_msgs/msg/TFMessage"),
+        (Kind.SERVICE, "rover/estop/press", "std_srvs/srv/Trigger"),
+    )
+    assert drives(announced) == "lira drive lidar-expert --connect rosbot:7447 --name rover"
+    text = "\n".join(page(replace(announced, heard=(Heard("rover/scan", 9.0, 1, OURS, SCAN),)), "rosbot:7447"))
+    assert "our own bus, robot 'rover'" in text
+    assert "zenoh-bridge" not in text
+    beside = replace(announced, routes=(*announced.routes, *routes((Kind.PUBLISHER, "scan", SCAN)).routes))
+    assert {place.robot for place in sort(beside)} == {"rover", ""}
+
+
+def test_of_topics_on_which_nothing_comes_that_is_said():
+    said = (Kind.PUBLISHER, "scan", SCAN), (Kind.SUBSCRIPTION, "cmd_vel", TWIST)
+    assert "nothing came on any of these topics" in page(routes(*said), "rosbot:7447")[-1]
+
+
+def test_a_look_that_hears_nothing_ends_with_1_and_a_remedy(capsys, monkeypatch):
+    monkeypatch.setattr("lira.hal.ros_graph.look.look", lambda *_: Sight())
+    assert main(["ros2", "--look", "--connect", "127.0.0.1:1"]) == 1
+    assert "ROS_DOMAIN_ID" in capsys.readouterr().out
 
 
 def test_nothing_at_all_is_said():

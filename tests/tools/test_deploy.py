@@ -266,6 +266,45 @@ def test_a_dry_run_shows_all_of_it_and_changes_nothing(home, capsys):
     assert asked(home) == []
 
 
+@pytest.mark.parametrize(
+    "words",
+    [
+        ["laptop"],
+        ["laptop", "--robot", "192.0.2.1"],
+        ["robot", "--host", "ada@nowhere.invalid", "--", "--base", "b", "--without", "lidar", "--without", "camera"],
+        ["robot", "--", "--base", "b", "--without", "lidar", "--without", "camera"],
+    ],
+)
+def test_a_dry_run_starts_no_program_and_so_needs_none(home, words, monkeypatch, capsys):
+    monkeypatch.setattr(subprocess, "Popen", lambda *_, **__: pytest.fail("a dry run started a program"))
+    monkeypatch.setenv("PATH", str(home.parent / "nothing"))
+    at = words.index("--") if "--" in words else len(words)
+    assert main(["deploy", *words[:at], "--dry-run", *words[at:]]) == 0
+    out = capsys.readouterr().out
+    assert "ExecStart=" in out
+    assert "systemctl --user enable" in out
+    assert files_of(home) == set()
+
+
+def test_a_dry_run_supposes_the_home_of_who_is_named_and_says_so(home, capsys):
+    words = ["--", "--base", "b", "--without", "lidar", "--without", "camera"]
+    assert main(["deploy", "robot", "--host", "ada@rover", "--dry-run", *words]) == 0
+    out = capsys.readouterr().out
+    assert "on ada@rover" in out
+    assert "supposed: /home/ada, systemd" in out
+    assert "ExecStart=/home/ada/.local/share/lira/rosbot/venv/bin/python" in out
+    assert re.search(r"lira_rosbot-\S+\.whl \(644, built from this checkout when it is deployed\)", out)
+
+
+def test_a_dry_run_still_refuses_a_method_that_there_is_not(home):
+    assert main(["deploy", "laptop", "--dry-run", "--method", "nope"]) == 2
+
+
+def test_words_for_the_robot_that_are_missing_are_asked_for_after_the_dashes(home, capsys):
+    assert main(["deploy", "robot", "--dry-run"]) == 2
+    assert "after --" in capsys.readouterr().err
+
+
 def test_it_is_deployed_changed_and_removed(home, capsys):
     assert main(["deploy", "laptop", "--set", "look"]) == 0
     assert "lira-rosbot.target is started" in capsys.readouterr().out

@@ -96,7 +96,7 @@ def test_a_robot_is_deployed_runs_what_came_and_is_left_as_it_was(far, wheels, c
     home, asked = far / "home", far / "asked"
     words = ["--wheels", str(wheels), "--offline"]
     assert deploy(far, "--dry-run", *words, *WORDS) == 0
-    assert "on robot, in the home folder of its user:" in capsys.readouterr().out
+    assert "on robot, in the home folder of its user" in capsys.readouterr().out
     assert files_of(home) == []
 
     assert deploy(far, *words, *WORDS) == 0

@@ -132,7 +132,7 @@ def test_a_novice_that_is_not_there_is_refused_before_anything_starts(tmp_path, 
     monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path))
     monkeypatch.setenv("XDG_RUNTIME_DIR", str(tmp_path))
     assert main(["up", "--name", "absent", "--policy", str(tmp_path / "novice.safetensors")]) == 2
-    assert "there is no novice" in capsys.readouterr().err
+    assert "there is no checkpoint" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize("method", ["nobody-knows-it", "switching"])

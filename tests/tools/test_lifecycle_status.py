@@ -20,7 +20,7 @@ from lira.tools.lifecycle.line import WINDOW_S, Rate
 from lira.tools.lifecycle.logs import Follower, last_lines
 from lira.tools.lifecycle.monitor import rate_of
 from lira.tools.lifecycle.records import HEARD, STATE, Heard, ProcessState, State, TopicState
-from lira.tools.lifecycle.restart import Phase
+from lira.tools.lifecycle.restart import CALM_S, Phase
 from lira.tools.lifecycle.setup import Setup
 from lira.tools.lifecycle.status import as_object, as_text, look
 from lira.tools.verbs import VERBS, module_of
@@ -105,6 +105,34 @@ def test_status_tells_processes_topics_link_and_who_drives(state_folder):
     assert told["heard"]["age_s"] == 0.2
     assert told["heard"]["topics"][1]["age_s"] is None
     json.dumps(told, allow_nan=False)
+
+
+def test_how_a_process_ended_is_told_until_it_has_run_for_a_minute(state_folder):
+    def told(runs_s):
+        learner = ProcessState("learner", "learns", Phase.RUNS, NOW_S - runs_s, 12, 2, "", "signal SIGKILL")
+        with state_folder.held():
+            write(state_folder, state_folder.supervisor(), (ROWS[0], learner))
+            return as_text(look("rosbot", NOW_S))
+
+    assert "learns (it ended with signal SIGKILL)" in told(CALM_S - 1.0)
+    assert "SIGKILL" not in told(CALM_S)
+
+
+def test_remedies_name_the_robot_that_was_asked_for(state_folder, capsys):
+    assert main(["logs", "--name", "second"]) == 2
+    assert "lira up --name second." in capsys.readouterr().err
+    assert "lira up --name second" in as_text(look("second", NOW_S))
+    assert as_text(look("rosbot", NOW_S)).endswith("lira up")
+    second = StateFolder("second")
+    with second.held():
+        with pytest.raises(AlreadyUpError, match="'second' is up already") as refused, second.held():
+            pass
+        assert "lira down --name second" in refused.value.remedy
+        assert folders.meant(None) == "second"
+        assert folders.meant("third") == "third"
+        old = msgspec.structs.replace(HEARS, time_s=0.0)
+        write(second, second.supervisor(), (MONITOR,), old)
+        assert "lira logs monitor --name second" in as_text(look("second", NOW_S))
 
 
 def test_all_is_well_when_all_of_it_runs_and_the_robot_is_heard(state_folder):

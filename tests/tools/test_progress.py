@@ -1,10 +1,13 @@
 import io
 
+import msgspec
 import pytest
 from synthetic_run import write_run
 
 from lira.fusion.log.run_log import LapRecord, StepRecord, read_run
 from lira.hal.errors import StorageError
+from lira.hal.messages import Phase
+from lira.tools.report.digest import digest
 from lira.tools.runs import progress
 from lira.tools.runs.progress import Display, Progress, Tail
 
@@ -45,11 +48,20 @@ def test_every_lap_and_the_end_leave_a_line(run_file):
     assert len(lines) == 1 + 7 + 1
     assert lines[0] == "lira (hold) on line-obstacles, layout 0, seed 1"
     assert lines[1].startswith("training lap 1   passed")
-    assert lines[2].startswith("proving run 1    failed")
+    assert lines[2].startswith("proving run 1.1  failed")
     assert "collisions 1, lost 0" in lines[2]
     assert lines[-1].startswith("proven after 2 training laps: the novice alone passed the layout it was taught on; ")
     assert watch.result is not None
     assert watch.result.converged
+
+
+def test_proving_runs_after_one_lap_are_told_apart_and_named_as_in_the_report():
+    lap = LapRecord(Phase.PROVE, 1, 0, True, True, 57.0, 0, 0, None, 0, 0, 0, 0, 0, 0.0)
+    laps = [lap, lap, msgspec.structs.replace(lap, lap=2), lap]
+    watch = Progress()
+    names = [line.split("  ")[0] for record in laps if (line := watch.note(record))]
+    assert names == ["proving run 1.1", "proving run 1.2", "proving run 2.1", "proving run 1.3"]
+    assert [each.title.lower() for each in digest(laps).laps] == names
 
 
 def test_the_status_tells_who_drives_and_how_fast(run_file):

@@ -4,6 +4,7 @@ import shlex
 import subprocess
 import sys
 import tempfile
+from importlib.metadata import version
 from pathlib import Path
 
 import lira
@@ -11,6 +12,7 @@ from lira.hal.errors import ConfigError
 from lira.tools.deploy.plan import File
 from lira.tools.launch.processes import ProcessError
 
+DISTRIBUTION = "lira-rosbot"
 OURS = "lira_rosbot-*.whl"
 BUILD_S = 300.0
 EXTRAS = "robot,drive"
@@ -22,10 +24,13 @@ def share(name: str) -> str:
     return f".local/share/lira/{name}"
 
 
-def collect(folder: Path | None, name: str) -> list[File]:
-    """The wheels of a folder, or ours alone, built from the checkout that runs. Raises `ConfigError`."""
+def collect(folder: Path | None, name: str, *, build: bool = True) -> list[File]:
+    """The wheels of a folder, or ours alone, built from the checkout that runs. Raises `ConfigError`.
+
+    Without `build` ours is but named: the file is empty.
+    """
     if folder is None:
-        return _built(name)
+        return _ours(name, build=build)
     found = sorted(folder.glob("*.whl")) if folder.is_dir() else []
     if not any(path.match(OURS) for path in found):
         raise ConfigError(f"no {OURS} is in {folder}", f"Make it: pip wheel --wheel-dir {folder} lira-rosbot[robot].")
@@ -54,15 +59,17 @@ def steps(name: str, files: list[File], python3: str, *, offline: bool) -> tuple
     )
 
 
-def _built(name: str) -> list[File]:
+def _ours(name: str, *, build: bool) -> list[File]:
     root = Path(lira.__file__).resolve().parent.parent
     if not (root / "pyproject.toml").is_file():
         raise ConfigError("this installation has no wheel of itself to copy", "Give a folder that has: --wheels DIR.")
+    limits = File(f"{share(name)}/wheels/{CONSTRAINTS}", (root / CONSTRAINTS).read_bytes())
+    if not build:
+        return [File(f"{share(name)}/wheels/{OURS.replace('*', f'{version(DISTRIBUTION)}-py3-none-any')}", b""), limits]
     with tempfile.TemporaryDirectory() as made:
         command = [sys.executable, "-m", "pip", "wheel", "--quiet", "--no-deps", "--wheel-dir", made, str(root)]
         done = subprocess.run(command, capture_output=True, text=True, timeout=BUILD_S, check=False)
         if done.returncode:
             raise ProcessError(f"the wheel cannot be built: {done.stderr.strip()}", "Give one that is: --wheels DIR.")
         found = [File(f"{share(name)}/wheels/{path.name}", path.read_bytes()) for path in Path(made).glob(OURS)]
-    limits = File(f"{share(name)}/wheels/{CONSTRAINTS}", (root / CONSTRAINTS).read_bytes())
     return [*found, limits]

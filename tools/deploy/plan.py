@@ -26,7 +26,9 @@ class File:
     mode: int = PLAIN
 
     def shown(self) -> str:
-        """The file for a person: its text, or how much it is."""
+        """The file for a person: its text, or how much it is; one without data is made when it is deployed."""
+        if not self.data:
+            return f"--- ~/{self.path} ({self.mode:o}, built from this checkout when it is deployed)"
         head = f"--- ~/{self.path} ({self.mode:o}, {len(self.data)} bytes)"
         if self.mode == SECRET or len(self.data) > MOST_SHOWN:
             return head

@@ -22,6 +22,10 @@ cat "$1" 2>/dev/null || true
 """
 
 
+USUAL_SYSTEMD = 255
+USUAL_PYTHON = 3, 12
+
+
 @dataclass(frozen=True, slots=True)
 class Facts:
     """What matters of a machine: its user's home, the versions of its systemd (0: none) and Python, what was there."""
@@ -30,6 +34,11 @@ class Facts:
     systemd: int
     python: tuple[int, ...]
     before: tuple[str, ...] = ()
+
+    @property
+    def words(self) -> str:
+        """The machine, for a person."""
+        return f"{self.home}, systemd {self.systemd}, Python {'.'.join(map(str, self.python))}"
 
 
 class Target:
@@ -60,6 +69,15 @@ class Target:
         version = tuple(int(part) for part in lines[2].split())
         return Facts(lines[0], int(lines[1]), version, tuple(lines[3:]))
 
+    def suppose(self, name: str) -> Facts:
+        """What `look` would find on a usual machine, without asking it: for a plan that is only shown."""
+        if self._host is not None:
+            user, _, _ = self._host.rpartition("@")
+            return Facts(f"/home/{user or 'USER'}", USUAL_SYSTEMD, USUAL_PYTHON)
+        manifest = Path.home() / manifest_of(name)
+        before = manifest.read_text(errors="replace").splitlines() if manifest.is_file() else ()
+        return Facts(str(Path.home()), USUAL_SYSTEMD, USUAL_PYTHON, tuple(before))
+
     def put(self, plan: Plan, facts: Facts) -> str:
         """Do what a plan says, and return what was said there."""
         return self.run(plan.script(list(facts.before)), data=plan.archive())
@@ -71,7 +89,8 @@ class Target:
         try:
             done = subprocess.run(command, input=data, capture_output=True, timeout=timeout_s, check=False)
         except FileNotFoundError as error:
-            raise ProcessError(f"there is no {command[0]} here", "Install it: openssh-client.") from error
+            remedy = "Install openssh-client." if self._host else "Is it in PATH?"
+            raise ProcessError(f"there is no {command[0]} here", remedy) from error
         except subprocess.TimeoutExpired as error:
             raise ProcessError(f"{self.where} has not answered for {timeout_s:.0f} s", "Try again.") from error
         if done.returncode:

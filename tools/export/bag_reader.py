@@ -23,6 +23,7 @@ from lira.hal.messages.ros_table import CODECS, TYPES
 from lira.hal.profile import RobotProfile
 from lira.tools.export.demonstrations import Shown
 
+REMEDY = "Give the folder of a bag, or of a LeRobot data set."
 Heard = tuple[float, str, Any]  # when, for what, and which message
 BREAK_S = 2.0  # of silence: the next episode
 ROLES: dict[str, tuple[type, ...]] = {
@@ -49,12 +50,14 @@ def read_bag(path: Path, profile: RobotProfile, topics: Mapping[str, str]) -> It
     Where nobody drove, or a sensor that the robot learns from is silent or useless, nothing is yielded.
     Raises `StorageError` for what is no bag, `ConfigError` if it is not clear which topic is meant.
     """
+    if not path.exists():
+        raise StorageError(f"there is no {path}", REMEDY)
     try:
         with AnyReader([path], default_typestore=TYPES) as bag:
             chosen = choose({each.topic: each.msgtype for each in bag.connections}, topics)
             yield from shown_by(_values(bag, {each.topic: each for each in chosen}), profile)
     except (AnyReaderError, OSError) as error:
-        raise StorageError(f"{path} is no bag that can be read: {error}", "Give the folder of a bag.") from error
+        raise StorageError(f"{path} is no bag that can be read: {error}", REMEDY) from error
 
 
 def _values(bag: AnyReader, chosen: Mapping[str, Chosen]) -> Iterator[Heard]:

@@ -6,13 +6,13 @@ from typing import Any
 import msgspec
 
 from lira.hal.bus.topics import APPLIED, CAMERA, DECISION, ODOM, SCAN, SIM_STATE
-from lira.hal.messages import Applied, Call, CourseState, Decision, Driver, Odometry, Phase, Reason, Twist, is_neutral
+from lira.hal.messages import Applied, Call, CourseState, Decision, Driver, Odometry, Reason, Twist, is_neutral
 from lira.tools.inquiry.algorithm import activity, line_of, settings_of, spoken
 from lira.tools.inquiry.moment import Moment
 from lira.tools.inquiry.trace import Step
 from lira.tools.operator.voice import explain, speak
+from lira.tools.output.lap_names import PHASES
 
-PHASES = {Phase.TRAIN: "training lap", Phase.PROVE: "proving run", Phase.UNSEEN: "unseen layout"}
 WIDTH = 9
 
 

@@ -107,6 +107,11 @@ class Bridge:
         """How the dead-man is."""
         return self._hand.state
 
+    @property
+    def pad(self) -> str:
+        """Name of the pad; "" while there is none."""
+        return "" if self._pad is None else self._pad.name
+
     def run(self, stop: threading.Event, alive: Callable[[], None] = lambda: None) -> None:
         """Go on until `stop` is set; then let the robot stand if a hand was on the controls.
 

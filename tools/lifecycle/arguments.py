@@ -1,15 +1,15 @@
 """The words by which `lira up` and `lira deploy laptop` are told what shall run, and the set-up that they mean."""
 
 import argparse
-from importlib.util import find_spec
 from pathlib import Path
 from typing import NamedTuple
 
 from lira.hal.bus.endpoint import DEFAULT_ENDPOINT, DEFAULT_ROBOT
-from lira.hal.errors import ConfigError, MissingExtraError
+from lira.hal.errors import ConfigError
 from lira.tools.lifecycle.setup import PAGE_PORT, PORT, Setup, endpoint_of, run_folder
 from lira.tools.lifecycle.table import SETS, chosen, rows
 from lira.tools.options import DEFAULT, add_layout, add_seed
+from lira.tools.output.places import check_folder
 
 WORLD = "line"
 
@@ -56,6 +56,7 @@ def setup_of(args: argparse.Namespace, ports: Ports) -> Setup:
         raise ConfigError("--profile and --listen are the twin's", "A real robot has its own: leave them out.")
     world = "" if args.robot is not None else args.world or WORLD
     folder = args.run or run_folder(args.name, args.method if chosen_set == "teach" else chosen_set, world)
+    check_folder(folder)
     return Setup(
         name=args.name,
         endpoint=endpoint_of(args.robot) if args.robot is not None else args.listen or f"127.0.0.1:{ports.twin}",
@@ -72,24 +73,27 @@ def setup_of(args: argparse.Namespace, ports: Ports) -> Setup:
 
 def check_packages(setup: Setup) -> None:
     """Refuse what lacks a package before anything starts. Raises `MissingExtraError`."""
-    from lira.tools.cli import EXTRAS
+    from lira.tools.cli import require
 
     for process in rows(setup):
-        for package in process.packages:
-            if find_spec(package) is None:
-                raise MissingExtraError(package, EXTRAS[package])
+        require(*process.packages)
 
 
 def check_method(setup: Setup) -> None:
-    """Refuse a method by which nobody learns. It loads the learner's libraries. Raises `ConfigError`."""
+    """Refuse a method by which nobody learns, or that lacks a package. Raises `ConfigError`, `MissingExtraError`."""
     if "learner" in setup.processes:
         from lira.fusion.methods.presets import method_named
+        from lira.tools.cli import require
 
-        if not method_named(setup.method).approach.learns:
+        preset = method_named(setup.method)
+        require(*preset.packages)
+        if not preset.approach.learns:
             raise ConfigError(f"by the method '{setup.method}' nobody learns", "Choose another --method.")
 
 
 def check_policy(setup: Setup) -> None:
-    """Refuse a novice that is not there. Raises `ConfigError`."""
-    if setup.policy.endswith(".safetensors") and not Path(setup.policy).is_file():
-        raise ConfigError(f"there is no novice {setup.policy}", "Name novice.safetensors in the folder of a run.")
+    """Refuse a policy that there is not. It loads what drives. Raises `ConfigError`, `StorageError`, `PluginError`."""
+    if setup.policy:
+        from lira.fusion.experts.load import check_named
+
+        check_named([setup.policy])

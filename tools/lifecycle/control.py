@@ -74,8 +74,9 @@ def take_down(name: str, say: Say) -> bool:
 def _stop_services(name: str, say: Say) -> bool:
     if services.look(name) is None:
         return False
-    services.ask_systemd(["stop", services.target_name(name)])
-    say(f"{services.target_name(name)} is stopped until the machine starts again; for good: lira deploy --remove")
+    target = services.target_name(name)
+    services.ask_systemd(["stop", target])
+    say(f"{target} is stopped until the machine starts again; for good: lira deploy laptop (or robot) --remove")
     return True
 
 

@@ -13,9 +13,10 @@ from typing import TypeVar
 
 import msgspec
 
-from lira.hal.bus.endpoint import check_name
+from lira.hal.bus.endpoint import DEFAULT_ROBOT, check_name
 from lira.hal.config import load_json
 from lira.hal.errors import ConfigError, StorageError
+from lira.tools.lifecycle.setup import command_line
 
 T = TypeVar("T")
 LOOK_S = 0.2
@@ -67,7 +68,8 @@ class StateFolder:
             raise StorageError(f"cannot open {self.path / 'lock'}: {error.strerror}", REMEDY) from error
         try:
             if not _lock(lock):
-                raise AlreadyUpError(f"'{self.name}' is up already", "Look with: lira status. End it with: lira down.")
+                look, end = command_line("status", self.name), command_line("down", self.name)
+                raise AlreadyUpError(f"'{self.name}' is up already", f"Look with: {look}. End it with: {end}.")
             os.truncate(lock, 0)
             os.write(lock, str(os.getpid()).encode())
             yield
@@ -121,6 +123,12 @@ def _lock(file: int) -> bool:
             time.sleep(LOOK_S / 10)
         else:
             return True
+
+
+def meant(name: str | None) -> str:
+    """The name that is meant: the one that is said, else that of the only robot that is up here, else the usual one."""
+    up = names() if name is None else [name]
+    return up[0] if len(up) == 1 else DEFAULT_ROBOT
 
 
 def names() -> list[str]:

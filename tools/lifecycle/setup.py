@@ -36,6 +36,11 @@ class Setup(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tru
         return f"twin in '{self.world}' at {self.endpoint}" if self.world else f"robot at {self.endpoint}"
 
 
+def command_line(verb: str, name: str) -> str:
+    """The command line of a verb for the robot of a name."""
+    return f"lira {verb}" if name == DEFAULT_ROBOT else f"lira {verb} --name {name}"
+
+
 def endpoint_of(host: str) -> str:
     """Return HOST:PORT of a robot's HOST, HOST:PORT or [ADDRESS]; a port that is not said is the usual one."""
     last = host.rpartition(":")[2]

@@ -6,7 +6,9 @@ import msgspec
 
 from lira.tools.lifecycle import services
 from lira.tools.lifecycle.folder import StateFolder
-from lira.tools.lifecycle.records import HEARD, STATE, Heard, State
+from lira.tools.lifecycle.records import HEARD, STATE, Heard, ProcessState, State
+from lira.tools.lifecycle.restart import CALM_S, Phase
+from lira.tools.lifecycle.setup import command_line
 from lira.tools.output.table import format_table
 
 OLD_S = 3.0  # what the monitor wrote longer ago says nothing of now
@@ -61,13 +63,13 @@ def as_text(status: Status) -> str:
     """For a person."""
     state, heard, now_s = status.state, status.heard, status.now_s
     if state is None:
-        return f"nothing is up for '{status.name}'; start it with: lira up"
+        return f"nothing is up for '{status.name}'; start it with: {command_line('up', status.name)}"
     by = "" if state.pid else " (services of systemd)"
     head = f"'{status.name}' is up for {_for(now_s - state.since_s)}{by}: {state.setup.where}"
     blocks = [head, _processes(state, now_s)]
     if heard is None:
         if state.is_monitored:
-            blocks.append("nothing is heard of the robot: see lira logs monitor")
+            blocks.append(f"nothing is heard of the robot: see {command_line('logs monitor', status.name)}")
         return "\n\n".join(blocks)
     blocks.append(_topics(heard, now_s - heard.time_s))
     said = [("link", heard.link), ("governor", heard.governor), (heard.who, f"{heard.why} {heard.now}".strip())]
@@ -82,13 +84,15 @@ def _processes(state: State, now_s: float) -> str:
         cells.append([process.name, process.phase, pid, _for(now_s - process.since_s), str(process.starts)])
     names = ("process", "phase", "pid", "for", "starts")
     lines = format_table(names, cells).splitlines()
-    notes = ["says", *(_note(process.says or process.does, process.ended) for process in state.processes)]
+    notes = ["says", *(_note(process, now_s) for process in state.processes)]
     width = max(map(len, lines))
     return "\n".join(f"{line.ljust(width)}  {note}".rstrip() for line, note in zip(lines, notes, strict=True))
 
 
-def _note(words: str, ended: str) -> str:
-    return f"{words} (it ended with {ended})" if ended else words
+def _note(process: ProcessState, now_s: float) -> str:
+    """What it says, and how it ended last, until it has run for so long that this is over."""
+    words, over = process.says or process.does, process.phase is Phase.RUNS and now_s - process.since_s >= CALM_S
+    return words if over or not process.ended else f"{words} (it ended with {process.ended})"
 
 
 def _topics(heard: Heard, late_s: float) -> str:

@@ -9,7 +9,7 @@ from mcap.writer import CompressionType, Writer
 
 from lira.hal.bus.topics import LATCHED_KEYS
 from lira.tools.recording.bag import BagFile, write_bag
-from lira.tools.recording.layout import BAG, PROFILE, files_of
+from lira.tools.recording.layout import ATTACHMENT_KEY, BAG, PROFILE, files_of
 from lira.tools.recording.reader import Recording
 from lira.tools.recording.writer import CHUNK_BYTES
 
@@ -28,10 +28,15 @@ def recover(path: Path) -> Iterator[str]:
             latched = topic.removeprefix(f"/{recording.head.robot}/") in LATCHED_KEYS
             found.note(topic, ros_type, log_ns, latched=latched)
         bag.append(found)
-        yield f"{each}: {'whole' if records is None else 'mended'}, {found.count} messages"
+        yield f"{each}: {'whole' if records is None else 'mended'}, {_heard(found)} messages"
     if path.is_dir():
         write_bag(files[0].parent, bag, Recording(files[0]).head)
         yield f"{files[0].parent / BAG} written"
+
+
+def _heard(file: BagFile) -> int:
+    """How many messages were heard; what rode beside them is none, although others read it as a topic."""
+    return sum(count for (topic, _, _), count in file.topics.items() if not topic.endswith(f"/{ATTACHMENT_KEY}"))
 
 
 def _is_torn(recording: Recording, path: Path) -> bool:

@@ -17,14 +17,17 @@ from lira.fusion.log.run_log import (
 )
 from lira.hal.errors import StorageError
 from lira.hal.messages import Action, Driver, Phase
+from lira.tools.output.lap_names import lap_name
 
 MOMENT_S = 2.0  # a lap of training that was cut off so soon was none: somebody asked for the proof
-PHASES = {Phase.TRAIN: "Training lap", Phase.PROVE: "Proving run", Phase.UNSEEN: "Unseen layout"}
 
 
 @dataclass(frozen=True, slots=True)
 class Lap:
-    """The steps of one lap in order; `record` is None for a lap that was cut off, `day` for a run of one day."""
+    """The steps of one lap in order; `record` is None for a lap that was cut off, `day` for a run of one day.
+
+    `turn` counts the proving runs after a training lap.
+    """
 
     phase: Phase
     number: int
@@ -32,13 +35,13 @@ class Lap:
     steps: tuple[StepRecord, ...]
     record: LapRecord | None = None
     day: int | None = None
+    turn: int = 1
 
     @property
     def title(self) -> str:
         """Name for headings: a training lap by its number, the others by what they prove."""
-        name = PHASES.get(self.phase, self.phase)
-        name = f"{name} {self.layout}" if self.phase == Phase.UNSEEN else f"{name} {self.number}"
-        return name if self.day is None else f"Day {self.day}: {name[0].lower()}{name[1:]}"
+        name = lap_name(self.phase, self.number, self.layout, self.turn)
+        return f"{name[0].upper()}{name[1:]}" if self.day is None else f"Day {self.day}: {name}"
 
     @property
     def began_s(self) -> float:
@@ -130,7 +133,8 @@ class _Sorter:
         if ended and record is None and phase == Phase.TRAIN and _lasted_s(self.steps) < MOMENT_S:
             self.steps = []
             return
-        self.laps.append(Lap(phase, number, layout, tuple(self.steps), record, self.days))
+        same = [lap for lap in self.laps if (lap.day, lap.phase, lap.number) == (self.days, phase, number)]
+        self.laps.append(Lap(phase, number, layout, tuple(self.steps), record, self.days, len(same) + 1))
         self.steps = []
 
 

@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from lira.hal.bus.sensors import SENSORS
-from lira.hal.bus.topics import Topic
+from lira.hal.bus.topics import ESTOP_PRESS, Topic
 from lira.hal.errors import CodecError
 from lira.hal.messages import Twist, TwistStamped
 from lira.hal.messages.codec import decode, ros_type_of
@@ -46,10 +46,13 @@ class Found:
 def sort(sight: Sight) -> dict[Place, Found]:
     """Sort what was seen by its places."""
     found: dict[Place, Found] = {}
+    ours = _ours(sight)
     for endpoint in sight.endpoints:
         _note(found, Place(endpoint.node.domain), endpoint.kind, endpoint.name.strip("/"), endpoint.ros_type)
     for route in sight.routes:
-        _note(found, Place(), route.kind, route.key, route.ros_type)
+        robot, _, name = route.key.partition("/")
+        place, name = (Place(robot=robot), name) if robot in ours else (Place(), route.key)
+        _note(found, place, route.kind, name, route.ros_type)
     for heard in sight.heard:
         place, name = _place(heard)
         there = found.setdefault(place, Found())
@@ -57,6 +60,13 @@ def sort(sight: Sight) -> dict[Place, Found]:
         if not heard.ros_type and name not in there.said and (kind := guess(heard.sample)):
             there.said[name] = kind
     return found
+
+
+def _ours(sight: Sight) -> set[str]:
+    """Robots of ours: by what they send, and by the service that only they announce; to a bridge they say the rest."""
+    services = {route.key.partition("/")[::2] for route in sight.routes if route.kind is Kind.SERVICE}
+    told = {robot for robot, name in services if name == ESTOP_PRESS}
+    return told | {heard.key.partition("/")[0] for heard in sight.heard if heard.attached == OURS}
 
 
 def guess(payload: bytes) -> str:

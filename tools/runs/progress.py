@@ -2,6 +2,7 @@
 
 import shutil
 import time
+from collections import Counter
 from collections.abc import Callable
 from pathlib import Path
 from typing import TextIO
@@ -12,12 +13,12 @@ from lira.fusion.log.run_log import LapRecord, Record, ResultRecord, RunRecord, 
 from lira.hal.config import MALFORMED
 from lira.hal.errors import StorageError
 from lira.hal.messages import Call, Decision, MethodCalls, Phase
+from lira.tools.output.lap_names import lap_name
 from lira.tools.output.proven import proof_words
 
 Publish = Callable[[Decision | MethodCalls], None]
 Say = Callable[[str], None]
 
-PHASES = {Phase.TRAIN: "training lap", Phase.PROVE: "proving run", Phase.UNSEEN: "unseen layout"}
 TTY_PERIOD_S = 0.1
 PLAIN_PERIOD_S = 5.0
 
@@ -52,6 +53,7 @@ class Progress:
     def __init__(self) -> None:
         self._first: StepRecord | None = None
         self._newest: StepRecord | None = None
+        self._proofs: Counter[int] = Counter()  # proving runs after each training lap
         self.result: ResultRecord | None = None
 
     def note(self, record: Record) -> str | None:
@@ -62,11 +64,14 @@ class Progress:
                 self._newest = record
                 return None
             case RunRecord():
+                self._proofs.clear()
                 return (
                     f"{record.method} ({record.preset}) on {record.world}, layout {record.layout}, seed {record.seed}"
                 )
             case LapRecord():
-                return lap_line(record)
+                line = lap_line(record, self._turn(record.lap))
+                self._proofs[record.lap] += record.phase == Phase.PROVE
+                return line
             case ResultRecord():
                 self.result = record
                 return result_line(record)
@@ -79,8 +84,8 @@ class Progress:
             return ""
         decision = self._newest.decision
         labels = decision.labels
-        number = self._newest.layout if decision.phase == Phase.UNSEEN else decision.lap
-        words = [f"{PHASES.get(decision.phase, decision.phase)} {number}", f"{decision.driver} drives"]
+        name = lap_name(decision.phase, decision.lap, self._newest.layout, self._turn(decision.lap))
+        words = [name, f"{decision.driver} drives"]
         if decision.call != Call.NONE:
             words.append(f"{decision.call} call")
         words.append(
@@ -92,11 +97,13 @@ class Progress:
             words.append(f"{(decision.stamp_s - self._first.decision.stamp_s) / elapsed_s:.0f}x real time")
         return " | ".join(words)
 
+    def _turn(self, lap: int) -> int:
+        return self._proofs[lap] + 1
 
-def lap_line(lap: LapRecord) -> str:
-    """One finished lap."""
-    number = lap.layout if lap.phase == Phase.UNSEEN else lap.lap
-    name = f"{PHASES.get(lap.phase, lap.phase)} {number}"
+
+def lap_line(lap: LapRecord, turn: int = 1) -> str:
+    """One finished lap; `turn` counts the proving runs after a training lap."""
+    name = lap_name(lap.phase, lap.lap, lap.layout, turn)
     words = f"{name:<16} {'passed' if lap.passed else 'failed'} {lap.duration_s:6.1f} s"
     words += f"  collisions {lap.collisions}, lost {lap.lost}"
     if lap.stops:

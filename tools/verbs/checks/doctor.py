@@ -42,12 +42,14 @@ def run(args: argparse.Namespace) -> int:
     """Look at everything; 1 if something failed."""
     from lira.hal.errors import ConfigError
     from lira.hal.profile import load_profile
+    from lira.robot.settings import load_settings
     from lira.tools.doctor.checks import examine, worst
     from lira.tools.doctor.finding import Level, Patient
     from lira.tools.output.machine import take_stdout, write_file
 
     if not 0.5 <= args.seconds <= 600.0:
         raise ConfigError(f"--seconds {args.seconds} is out of range", "Give 0.5 to 600.")
+    load_settings(args.settings)
     wanted = {name: getattr(args, name) for name in Patient.__dataclass_fields__ if name != "profile"}
     patient = Patient(load_profile(args.profile), **wanted)
     output = take_stdout() if args.json == "-" else sys.stdout

@@ -50,9 +50,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Run the matrix, or the mutants."""
+    from lira.hal.profile import load_profile
     from lira.tools.bench import describe_machine
     from lira.tools.output.machine import take_stdout, write_file
 
+    load_profile(args.profile)  # said here rather than by each process that is given it
     output = take_stdout() if args.json == "-" else sys.stdout
     signal.signal(signal.SIGTERM, signal.default_int_handler)  # whatever ends this ends all that it has started
     with TemporaryDirectory() as folder:

@@ -49,11 +49,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Drive until done or told to stop."""
+    from lira.fusion.experts.load import check_named
     from lira.fusion.inference.threads import one_thread
     from lira.hal.client.remote import connect
     from lira.tools.runs.alone import examine, show
     from lira.tools.runs.reach import reports_of, say
 
     one_thread()
+    check_named([args.policy], args.experts)
     with connect(args.connect, args.name, close_s=CLOSE_S) as robot:
         return (examine if args.unseen else show)(args, robot, reports_of(robot), say)

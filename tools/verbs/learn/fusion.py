@@ -93,8 +93,10 @@ def run(args: argparse.Namespace) -> int:
     """Learn until done or told to stop. Exit status 1 if the novice did not drive alone as it should."""
     from lira.fusion.inference.threads import one_thread
     from lira.hal.client.remote import connect
+    from lira.tools.cli import require
 
     plan = plan_of(args)
+    require(*plan.preset.packages)
     if not plan.preset.approach.learns and args.teacher == "none":
         raise ConfigError(f"by the method '{args.method}' nobody learns", "Show it on a twin with --teacher perfect.")
     one_thread()
@@ -118,23 +120,18 @@ def learn_by_hand(args: argparse.Namespace, plan: "Plan", robot: "RemoteRobot") 
 
 def plan_of(args: argparse.Namespace) -> "Plan":
     """Return what the arguments ask to be taught. Raises `ConfigError`, and `PluginError` for somebody's own method."""
-    import msgspec
-
+    from lira.fusion.experts.load import check_named
     from lira.fusion.methods.presets import file_name, method_named
-    from lira.fusion.methods.syllabus import with_proof
+    from lira.tools.output.places import check_folder
     from lira.tools.runs.plan import Plan
 
-    preset = method_named(args.method)
-    if args.start is not None:
-        preset = preset.starting(args.start)
-    syllabus = preset.syllabus
-    if args.layouts is not None:
-        syllabus = msgspec.structs.replace(syllabus, layouts=args.layouts)
-    if args.proof is not None:
-        syllabus = with_proof(syllabus, args.proof)
-    learning = msgspec.structs.replace(preset.learning, idle_frames=args.idle_frames)
+    folder = args.run or Path("runs") / file_name(args.method)
+    check_folder(folder)
+    check_named(args.expert, args.experts)
     return Plan(
-        msgspec.structs.replace(preset, learning=learning, syllabus=syllabus),
+        method_named(args.method).taught(
+            start=args.start, layouts=args.layouts, proof=args.proof, idle_frames=args.idle_frames
+        ),
         layout=args.layout,
         seed=args.seed,
         laps=args.train_laps,
@@ -142,7 +139,7 @@ def plan_of(args: argparse.Namespace) -> "Plan":
         teacher=args.teacher,
         pair=args.experts,
         more=args.expert,
-        folder=args.run or Path("runs") / file_name(args.method),
+        folder=folder,
         shield=args.shield,
         command=args.as_command or shlex.join(["lira", *sys.argv[1:]]),
     )

@@ -2,8 +2,8 @@
 
 `lira deploy laptop` takes the words of `lira up` and makes a user unit of each process, in the environment that runs
 now. `lira deploy robot` does the same for `lira robot` (its words come after --), here or by ssh on the robot's
-computer, with an environment of its own there made from wheels. Units, keys and settings are shown by --dry-run, and
---remove undoes it all. Whatever drives begins paused, at every start.
+computer, with an environment of its own there made from wheels. --dry-run shows units, keys and settings, and asks no
+machine for anything; --remove undoes it all. Whatever drives begins paused, at every start.
 
 examples:
   lira deploy laptop --dry-run
@@ -14,17 +14,18 @@ examples:
 
 import argparse
 import sys
+from contextlib import nullcontext, suppress
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from lira.hal.bus.endpoint import DEFAULT_ENDPOINT, DEFAULT_ROBOT
-from lira.hal.errors import ConfigError
+from lira.hal.errors import ConfigError, MissingExtraError
 from lira.tools.lifecycle.arguments import add_setup
 from lira.tools.options import DEFAULT
 
 if TYPE_CHECKING:
     from lira.tools.deploy.plan import Plan
-    from lira.tools.deploy.target import Target
+    from lira.tools.deploy.target import Facts, Target
     from lira.tools.lifecycle.setup import Setup
 
 EVERYWHERE = "0.0.0.0:7447"
@@ -34,7 +35,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
     machines = parser.add_subparsers(dest="machine", required=True, metavar="MACHINE")
     laptop = machines.add_parser("laptop", help="what runs beside the robot, on this machine", allow_abbrev=False)
-    robot = machines.add_parser("robot", help="the robot's own side, on its computer", allow_abbrev=False)
+    robot = machines.add_parser(
+        "robot",
+        help="the robot's own side, on its computer",
+        epilog="Words for `lira robot` go after --, as in: lira deploy robot --host pi@rover -- --base /dev/core2 ...",
+        allow_abbrev=False,
+    )
     add_setup(laptop)
     laptop.add_argument("--record", action="store_true", help="record always, too: mind the disk")
     add = robot.add_argument
@@ -49,11 +55,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add("--wheels", type=Path, metavar="DIR", help="wheels to install there (default: one built from this checkout)")
     add("--offline", action="store_true", help="install from these wheels alone: the robot reaches no package index")
     add("--python", default="python3", metavar="NAME", help=f"Python there that makes its environment {DEFAULT}")
-    add("words", nargs="*", metavar="-- WORDS", help="words for `lira robot`: --base, --lidar, --camera, ...")
+    add("words", nargs="*", metavar="-- WORDS", help="after --, words for `lira robot`: --base, --lidar, --camera, ...")
     for machine in (laptop, robot):
         add = machine.add_argument
         add("--keys", type=Path, metavar="DIR", help="bundle of keys for it (lira keys)")
-        add("--dry-run", action="store_true", help="show all of it, and change nothing")
+        add("--dry-run", action="store_true", help="show all of it, change nothing, and ask no machine anything")
         add("--remove", action="store_true", help="undo it: stop, and delete what was written")
 
 
@@ -67,10 +73,10 @@ def run(args: argparse.Namespace) -> int:
         script = removal(_checked(args.name))
         print(script if args.dry_run else target.run(script))
         return 0
-    plan = laptop_plan(args, target) if args.machine == "laptop" else robot_plan(args, target)
-    facts = target.look(args.name)
+    plan, facts = laptop_plan(args, target) if args.machine == "laptop" else robot_plan(args, target)
     if args.dry_run:
-        print(f"on {target.where}, in the home folder of its user:\n\n{plan.shown(list(facts.before))}")
+        print(f"on {target.where}, in the home folder of its user (supposed: {facts.words}):\n")
+        print(plan.shown(list(facts.before)))
         return 0
     print(target.put(plan, facts))
     if plan.notes:
@@ -78,7 +84,7 @@ def run(args: argparse.Namespace) -> int:
     return 0
 
 
-def laptop_plan(args: argparse.Namespace, target: "Target") -> "Plan":
+def laptop_plan(args: argparse.Namespace, target: "Target") -> tuple["Plan", "Facts"]:
     """What runs beside the robot. Raises `ConfigError` and `MissingExtraError`."""
     from lira.tools.deploy.plans import for_laptop
     from lira.tools.lifecycle.arguments import Ports, check_method, check_packages, check_policy, setup_of
@@ -91,20 +97,23 @@ def laptop_plan(args: argparse.Namespace, target: "Target") -> "Plan":
     if not args.record and args.set != "look":
         args.without.append("recorder")
     setup = setup_of(args, Ports())
-    check_packages(setup)
-    check_method(setup)
-    check_policy(setup)
-    return for_laptop(setup, target.look(setup.name), sys.executable, Path.cwd(), args.keys)
+    with suppress(MissingExtraError, ModuleNotFoundError) if args.dry_run else nullcontext():
+        check_packages(setup)
+        check_method(setup)
+        check_policy(setup)
+    facts = target.suppose(setup.name) if args.dry_run else target.look(setup.name)
+    return for_laptop(setup, facts, sys.executable, Path.cwd(), args.keys), facts
 
 
-def robot_plan(args: argparse.Namespace, target: "Target") -> "Plan":
+def robot_plan(args: argparse.Namespace, target: "Target") -> tuple["Plan", "Facts"]:
     """What runs on the robot. Raises `ConfigError`."""
     from lira.tools.deploy.packages import collect
     from lira.tools.deploy.plans import for_robot
 
     setup, python3 = robot_setup(args), args.python
-    facts = target.look(setup.name, python3)
-    return for_robot(setup, facts, collect(args.wheels, setup.name), args.keys, python3=python3, offline=args.offline)
+    facts = target.suppose(setup.name) if args.dry_run else target.look(setup.name, python3)
+    brought = collect(args.wheels, setup.name, build=not args.dry_run)
+    return for_robot(setup, facts, brought, args.keys, python3=python3, offline=args.offline), facts
 
 
 def robot_setup(args: argparse.Namespace) -> "Setup":
@@ -112,6 +121,8 @@ def robot_setup(args: argparse.Namespace) -> "Setup":
     from lira.tools.lifecycle.setup import Setup
     from lira.tools.verbs.robots import robot
 
+    if not args.words:
+        raise ConfigError("no words for `lira robot`", "Give them after --, as in: -- --base /dev/core2 ...")
     parser = argparse.ArgumentParser(prog="lira deploy robot --", allow_abbrev=False)
     robot.add_arguments(parser)
     robot.check_devices(parser.parse_args(args.words))

@@ -20,10 +20,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Stop it."""
     from lira.tools.lifecycle.control import take_down
-    from lira.tools.lifecycle.folder import names
+    from lira.tools.lifecycle.folder import meant
 
-    up = names()
-    name = args.name or (up[0] if len(up) == 1 else DEFAULT_ROBOT)
+    name = meant(args.name)
     was_up = take_down(name, lambda words: print(words, flush=True))
     print(f"'{name}' is down" if was_up else f"nothing was up for '{name}'")
     return 0

@@ -17,22 +17,24 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
     add = parser.add_argument
     add("process", nargs="?", help="one of them (default: all)")
-    add("--name", default=DEFAULT_ROBOT, help=f"the robot's name on the bus {DEFAULT}")
+    add("--name", help=f"the robot's name on the bus (default: the one that is up, else {DEFAULT_ROBOT})")
     add("-n", "--lines", type=natural, default=10, metavar="N", help=f"so many lines of each {DEFAULT}")
     add("-f", "--follow", action="store_true", help="go on with what is written from now on")
 
 
 def run(args: argparse.Namespace) -> int:
     """Print them."""
-    from lira.tools.lifecycle.folder import StateFolder
+    from lira.tools.lifecycle.folder import StateFolder, meant
     from lira.tools.lifecycle.logs import follow, last_lines
+    from lira.tools.lifecycle.setup import command_line
 
-    folder = StateFolder(args.name)
+    name = meant(args.name)
+    folder = StateFolder(name)
     found = sorted(folder.logs.glob("*.log")) if folder.logs.is_dir() else []
     names = [log.stem for log in found]
     if not found:
-        remedy = f"Start it with: lira up. Of services: journalctl --user -u 'lira-{args.name}-*'."
-        raise ConfigError(f"nothing was ever up as '{args.name}' here", remedy)
+        remedy = f"Start it with: {command_line('up', name)}. Of services: journalctl --user -u 'lira-{name}-*'."
+        raise ConfigError(f"nothing was ever up as '{name}' here", remedy)
     if args.process is not None and args.process not in names:
         raise ConfigError(f"there is no log of '{args.process}'", f"There is one of: {', '.join(names)}.")
     logs = [log for log in found if args.process in (None, log.stem)]

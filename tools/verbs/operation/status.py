@@ -24,16 +24,15 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Tell what is up."""
-    from lira.tools.lifecycle.folder import names
+    from lira.tools.lifecycle.folder import meant, names
     from lira.tools.lifecycle.status import as_object, as_text, look
 
-    up = names()
-    name = args.name or (up[0] if len(up) == 1 else DEFAULT_ROBOT)
+    name = meant(args.name)
     status = look(name, time.monotonic())
     if args.json:
         print(json.dumps(as_object(status), indent=2, allow_nan=False))
     else:
         print(as_text(status))
-        if others := [other for other in up if other != name]:
+        if others := [other for other in names() if other != name]:
             print(f"\nalso up: {', '.join(others)} (lira status --name NAME)")
     return 0 if status.is_well else 1

@@ -35,14 +35,15 @@ def run(args: argparse.Namespace) -> int:
     from lira.tools.lifecycle.arguments import Ports, check_packages, check_policy, setup_of
     from lira.tools.lifecycle.control import bring_up, supervise
     from lira.tools.lifecycle.ports import free_from
-    from lira.tools.lifecycle.setup import PAGE_PORT, PORT
+    from lira.tools.lifecycle.setup import PAGE_PORT, PORT, command_line
     from lira.tools.lifecycle.status import as_text, look
 
     before = look(args.name, time.monotonic())
     if before.state is not None:
         now = before.state.setup
         same = now == setup_of(args, Ports(int(now.endpoint.rpartition(":")[2]), now.page_port))
-        print(f"already up{'' if same else ', as something else (lira down ends it)'}:\n\n{as_text(before)}")
+        other = "" if same else f", as something else ({command_line('down', args.name)} ends it)"
+        print(f"already up{other}:\n\n{as_text(before)}")
         return 0 if same else 1
     setup = setup_of(args, Ports(free_from(PORT), free_from(PAGE_PORT)))
     check_packages(setup)
@@ -51,7 +52,8 @@ def run(args: argparse.Namespace) -> int:
         supervise(setup, say)
         return 0
     bring_up(setup, say)
-    page = f"; teach and drive it at http://127.0.0.1:{setup.page_port}" if "page" in setup.processes else ""
+    does = "teach and drive it" if "learner" in setup.processes else "watch and drive it"
+    page = f"; {does} at http://127.0.0.1:{setup.page_port}" if "page" in setup.processes else ""
     say(f"up: {setup.where}{page}")
     return 0
 

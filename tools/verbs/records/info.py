@@ -1,11 +1,14 @@
-"""Say what a recording holds: of which robot, how long, which topics and how often, what is missing, who drove.
+"""Say what a recording holds: of which robot, how long, which topics and how often, what was lost, who drove.
+
+Lost is what was sent and never came to the recorder, by the numbers that senders give; "-" where those do not tell.
+What is latched is sent once, and told to all who ever come.
 
 examples:
   lira info runs/demo-20261127-101500
   lira info recordings/20261127-120000/20261127-120000_0.mcap
   lira info runs/mine --json -
 
-exit status: 0, 1 if something was lost or a file was cut off, 2 if there is no recording
+exit status: 0, 1 if the recorder lost something or a file was cut off, 2 if there is no recording
 """
 
 import argparse
@@ -55,16 +58,15 @@ def words(summary: "Summary") -> str:
         f"{summary.duration_s:.1f} s of the robot's time, {size}, {many}",
         "",
         format_table(
-            ("topic", "type", "count", "rate", "gap", "size", "missing"),
+            ("topic", "type", "count", "rate", "gap", "size", "lost"),
             [
                 (
                     topic.key,
                     topic.ros_type,
                     str(topic.count),
-                    f"{topic.rate_hz:.1f} Hz",
-                    f"{topic.gap_s:.2f} s",
+                    *(("once", "") if topic.count == 1 else (f"{topic.rate_hz:.1f} Hz", f"{topic.gap_s:.2f} s")),
                     f"{topic.bytes / 1e3:.0f} kB",
-                    "" if topic.missing is None else str(topic.missing),
+                    "-" if topic.missing is None else str(topic.missing or "none"),
                 )
                 for topic in summary.topics.values()
             ],

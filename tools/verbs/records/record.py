@@ -61,12 +61,14 @@ def record(args: argparse.Namespace, stop: "Event") -> int:
     from lira.tools.cli import version
     from lira.tools.launch.lifetime import CLOSE_S
     from lira.tools.launch.notify import Notifier
+    from lira.tools.output.places import check_folder
     from lira.tools.recording.beside import READY, new_folder
     from lira.tools.recording.recorder import Recorder, listen
     from lira.tools.recording.writer import RecordingWriter
     from lira.tools.runs.reach import say
 
     folder = new_folder(args.run) if args.run else args.out or Path("recordings") / f"{datetime.now():%Y%m%d-%H%M%S}"
+    check_folder(folder)
     notifier = Notifier.from_environment()
     bus = Bus(args.name, connect=args.connect, watch=True)
     try:

@@ -13,6 +13,8 @@ examples:
   lira ros2 --offer --connect rosbot:7447       one of ours, offered to ROS (lira twin --ros2 starts this itself)
   lira ros2 --connect rosbot:7447 --namespace robot1 --topic odom=odometry/filtered --topic cmd_vel=base/cmd_vel
   lira drive lidar-expert
+
+exit status: 0, --look: 1 if nothing came there; 2 if it cannot be reached or something else went wrong
 """
 
 import argparse
@@ -108,8 +110,9 @@ def run(args: argparse.Namespace) -> int:
         from lira.hal.ros_graph.look import look
         from lira.tools.ros2.page import page
 
-        print("\n".join(page(look(args.connect, LISTEN_S), args.connect)))
-        return 0
+        sight = look(args.connect, LISTEN_S)
+        print("\n".join(page(sight, args.connect)))
+        return 0 if sight.heard else 1
 
     if args.offer is not None:
         return run_offer(args)

@@ -61,11 +61,24 @@ def run(args: argparse.Namespace) -> int:
             raise ConfigError(f"'{args.name}' waits for each command: no hand drives it", "Run it without --lockstep.")
         finder = Finder(mapping, args.device)
         bridge = Bridge(client, finder, PadMemory(state_file(), say), say, finder.advice)
-        words = f"joystick drives '{args.name}' at {args.connect}"
-        say(f"{words}; stop with Ctrl-C")
-        notifier.ready(words)
-        bridge.run(robot.stop, notifier.alive)
+        said = ""
+
+        def alive() -> None:
+            nonlocal said
+            if (words := doing(bridge.pad, args)) != said:
+                said = words
+                notifier.ready(words)
+            notifier.alive()
+
+        say(f"{doing(bridge.pad, args)}; stop with Ctrl-C")
+        bridge.run(robot.stop, alive)
     return 0
+
+
+def doing(pad: str, args: argparse.Namespace) -> str:
+    """What the bridge does with its pad, "" if there is none."""
+    what = f"drives '{args.name}' at {args.connect}"
+    return f"joystick {what} with {pad}" if pad else f"joystick waits for a pad, and then {what}"
 
 
 def say(words: str) -> None:

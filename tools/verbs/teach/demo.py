@@ -24,11 +24,10 @@ import sys
 import time
 from collections.abc import Sequence
 from datetime import datetime
-from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from lira.hal.errors import ConfigError, MissingExtraError
+from lira.hal.errors import ConfigError
 from lira.hal.messages import Phase
 from lira.tools.options import add_expert, add_layout, add_protocol, add_randomise, add_record, add_seed, natural
 
@@ -36,9 +35,6 @@ if TYPE_CHECKING:
     from lira.tools.launch.launch import Part
     from lira.tools.launch.processes import ChildProcess
 
-NEEDED = {"safetensors": "drive"}  # and the extra that brings it
-NEEDED_BY_NETWORKS = {"torch": "learn"}
-NEEDED_BY_WIRE = {"serial": "robot"}
 POLL_S = 0.1
 STALL_S = 60.0
 
@@ -76,9 +72,9 @@ def run(args: argparse.Namespace) -> int:
     from lira.fusion.experts.files import expert_path, experts_of
     from lira.fusion.experts.tasks import TASKS, task_of
     from lira.fusion.methods.presets import method_named
-    from lira.fusion.methods.syllabus import THESIS, with_proof
     from lira.hal.profile import load_profile
     from lira.sim_backend.catalogue import load_world
+    from lira.tools.cli import require
     from lira.tools.launch.launch import direct, twin_words, wired
     from lira.tools.launch.processes import free_port, lira_command
 
@@ -90,15 +86,8 @@ def run(args: argparse.Namespace) -> int:
     profile = load_profile(robot)
     for expert in experts_of(profile):
         expert_path(expert, profile, task)
-    trains = method_named(args.method).trains
-    for package, extra in {
-        **NEEDED,
-        **(NEEDED_BY_NETWORKS if trains else {}),
-        **(NEEDED_BY_WIRE if args.wire else {}),
-    }.items():
-        if find_spec(package) is None:
-            raise MissingExtraError(package, extra)
-    with_proof(THESIS, args.proof)
+    preset = method_named(args.method).taught(layouts=args.layouts, proof=args.proof)
+    require("safetensors", *preset.packages, *(["serial"] if args.wire else []))
     from lira.fusion.experts.load import load_policy  # not sooner: it takes the learner's libraries
 
     for expert in args.expert:
@@ -130,8 +119,10 @@ def supervise(parts: Sequence["Part"], fusion_command: list[str], folder: Path) 
 
     Raises `ProcessError` when one of them dies.
     """
+    from lira.tools.output.places import check_folder
     from lira.tools.report import RECORD
 
+    check_folder(folder)
     if (folder / RECORD).exists():
         raise ConfigError(f"{folder} already holds a run", "Choose another folder with --run.")
     try:

@@ -92,6 +92,7 @@ def run(args: argparse.Namespace) -> int:
     """Hold the session, and leave a report."""
     from lira.fusion.inference.threads import one_thread
     from lira.hal.client.remote import connect
+    from lira.tools.cli import require
     from lira.tools.launch.lifetime import CLOSE_S
     from lira.tools.live.rules import Rules
     from lira.tools.live.sitting import sit
@@ -101,6 +102,7 @@ def run(args: argparse.Namespace) -> int:
     args.run = args.run or Path("runs") / f"teach-{args.who}-{datetime.now():%Y%m%d-%H%M%S}"
     args.laps = args.laps or (SCRIPT_LAPS if scripted else LAPS)
     plan = plan_of(args)
+    require(*plan.preset.packages)
     one_thread()
     args.speed = args.speed or (SCRIPT_SPEED if scripted else 1.0)
     practice_s = args.practice if args.practice is not None else 2.0 if scripted else 15.0
@@ -118,19 +120,19 @@ def run(args: argparse.Namespace) -> int:
 
 def plan_of(args: argparse.Namespace) -> "Plan":
     """What is taught, and how. Raises `ConfigError` for what cannot be, before anything starts."""
-    import msgspec
-
+    from lira.fusion.experts.load import check_named
     from lira.fusion.methods.presets import method_named
-    from lira.fusion.methods.syllabus import THESIS
+    from lira.tools.output.places import check_folder
     from lira.tools.runs.plan import Plan
 
+    check_folder(args.run)
+    check_named(args.expert, args.experts)
     preset = method_named(args.method)
     if not preset.approach.learns:
         raise ConfigError(f"by the method '{args.method}' nobody learns", "Choose another --method.")
-    learning = msgspec.structs.replace(preset.learning, idle_frames=args.idle_frames)
     return Plan(
         # A person learns one course by heart; what the novice has not seen comes in the proof.
-        msgspec.structs.replace(preset, learning=learning, syllabus=THESIS),
+        preset.taught(layouts="own", proof="own", idle_frames=args.idle_frames),
         layout=args.layout,
         seed=args.seed,
         laps=args.laps,
