@@ -15,6 +15,7 @@ import numpy as np
 from msgspec import Meta
 from numpy.typing import NDArray
 
+from lira.fusion.learning.novice import HAND_TURN_RAD_S
 from lira.fusion.methods.base import STAND, Policy, Proposal
 from lira.fusion.preprocess import Features, Preprocessor
 from lira.fusion.teaching.foresight import Foresight
@@ -41,7 +42,7 @@ class TeacherSettings(Table, frozen=True):
     wander_rad: float = 0.1  # a larger turn within the horizon, without a box in the way, is wrong then
     safe_steps: int = 3
     longest_s: float = 20.0  # after so long in control a hand gives up: whatever it does there does not help
-    turn_rad_s: float = 1.1  # a hand turns a robot no faster, whatever the robot can do
+    turn_rad_s: float = HAND_TURN_RAD_S
     delay_s: float = 0.6  # median of the log-normal reaction delay
     called_delay_s: float = 0.35
     delay_sigma: float = 0.3
