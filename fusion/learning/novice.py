@@ -12,7 +12,7 @@ from lira.fusion.inference.architecture import Weights
 from lira.fusion.inference.build import alone
 from lira.fusion.inference.networks import DrivingNet
 from lira.fusion.learning.labels import Label, is_rest
-from lira.fusion.learning.learned_policy import LearnedPolicy
+from lira.fusion.learning.learned_policy import LearnedPolicy, Together
 from lira.fusion.preprocess import Features
 from lira.hal.config import Table
 from lira.hal.messages import Action, Driver
@@ -135,6 +135,10 @@ class NetworkNovice(Novice):
     def act(self, features: Features) -> Action:
         """a^N of the current network."""
         return self.network.act(features)
+
+    def together(self, *, proving: bool) -> Together:  # noqa: ARG002 - it does the same
+        """The current network on several observations."""
+        return self.network.act_all
 
     def remember(self, label: Label) -> None:
         """Hand a label to the trainer."""

@@ -61,7 +61,7 @@ class Journal:
             return ()  # it learned before the journal began, and nobody knows which these are
         places = [(self._learned[each.number], each) for each in found]
         return tuple(
-            ContradictionRecord(number, each.source, lap, since_s, each.action, each.others)
+            ContradictionRecord(number, each.source, lap, since_s, each.action, each.others, each.mirrored)
             for (number, lap, since_s), each in places
         )
 

@@ -115,7 +115,7 @@ class RunRecord(msgspec.Struct, frozen=True, tag="run"):
 class ContradictionRecord(msgspec.Struct, frozen=True):
     """A label that the novice does not follow, since the `others` say otherwise; `number` is its place in the log.
 
-    `stamp_s` counts from the first label of its lap.
+    `stamp_s` counts from the first label of its lap. `mirrored`: it is followed; left and right exchanged it is not.
     """
 
     number: int
@@ -124,6 +124,7 @@ class ContradictionRecord(msgspec.Struct, frozen=True):
     stamp_s: float
     action: Action
     others: Action
+    mirrored: bool = False
 
 
 class ResultRecord(msgspec.Struct, frozen=True, tag="result"):

@@ -233,8 +233,10 @@ class KernelRidge:
     @property
     def aside(self) -> dict[int, int]:
         """The labels of which an example is set aside, and the first such example of each."""
-        examples = np.flatnonzero(~self.fit.used)[::-1]
-        return dict(sorted((int(self.labels[i]), int(i)) for i in examples))
+        first: dict[int, int] = {}
+        for example in np.flatnonzero(~self.fit.used).tolist():
+            first.setdefault(int(self.labels[example]), example)
+        return first
 
     def shares(self, x: FloatArray) -> Doubles:
         """What each example adds to m(x) [n, 2]: m(x) = w(x)^T Y with w(x) = P k(x)."""
@@ -242,8 +244,12 @@ class KernelRidge:
 
     def act(self, x: FloatArray, gain: float = 1.0) -> tuple[float, float]:
         """m(x), the turn times `gain`, clipped."""
-        linear, angular = self.fit.mean(self.k(x)).tolist()
-        return clipped(linear), clipped(gain * angular)
+        (action,) = self.actions(self.k(x)[None], gain)
+        return action
+
+    def actions(self, k: Doubles, gain: float = 1.0) -> list[tuple[float, float]]:
+        """The same of several states, of which these are the kernel values [m, n]."""
+        return [(clipped(linear), clipped(gain * angular)) for linear, angular in self.fit.mean(k).tolist()]
 
     @property
     def gain(self) -> float:

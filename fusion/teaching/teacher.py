@@ -52,6 +52,7 @@ class TeacherSettings(Table, frozen=True):
     notices_s: float = 3.0  # a danger that was missed is seen so much later, if it lasts: a robot that stands and asks
 
 
+SLOWED = 0.5  # of the speed that was foreseen: a robot that is slower is being slowed down
 AS_FORESEEN = 1e-6  # metres, radians and so on: a robot that is so near to where it was foreseen is there
 NOBODY: Mapping[str, Policy] = MappingProxyType({})
 
@@ -63,14 +64,25 @@ TEACHERS = {"scripted": SKILLED, "perfect": PERFECT, "unskilled": UNSKILLED}
 
 @dataclass(frozen=True, slots=True)
 class Outlook:
-    """How a policy was foreseen to drive, state after state."""
+    """How a policy was foreseen to drive from where it `began`, state after state."""
 
     policy: Policy
+    began: CourseState
     drive: list[CourseState]
 
-    def holds(self, state: CourseState, policy: Policy) -> bool:
+    def came_true(self, state: CourseState, policy: Policy) -> bool:
         """Whether its first state has come true and the same policy is to drive on, none the wiser."""
         return policy == self.policy and _same_place(state, self.drive[0])
+
+    def still_holds(self, state: CourseState, policy: Policy) -> bool:
+        """Whether the same policy was slowed down, and is not as far yet as it was foreseen to be a step later."""
+        first = self.drive[0]
+        slow = abs(state.linear_m_s) < SLOWED * abs(first.linear_m_s)
+        return slow and policy == self.policy and _gap_m(self.began, state) < _gap_m(self.began, first)
+
+
+def _gap_m(one: CourseState, other: CourseState) -> float:
+    return math.hypot(one.x_m - other.x_m, one.y_m - other.y_m)
 
 
 def _same_place(one: CourseState, other: CourseState) -> bool:
@@ -156,23 +168,29 @@ class ScriptedTeacher:
 
     def _danger(self, state: CourseState, proposal: Proposal, policy: Policy) -> bool:
         """Whether the policy goes wrong; it does not where no policy could."""
-        if not self._goes_wrong(state, self._look_ahead(state, proposal.features, policy)):
+        outlook = self._look_ahead(state, proposal.features, policy)
+        if not self._goes_wrong(outlook.began, outlook.drive):
             return False
         slow = proposal.choice.action[0] < self._settings.stall
         return not self._settings.follow_line or slow or self._within_reach(state)
 
-    def _look_ahead(self, state: CourseState, seen: Features, policy: Policy) -> list[CourseState]:
-        """Foresee what the policy would do, beginning with what was foreseen a step ago if it has come true."""
+    def _look_ahead(self, state: CourseState, seen: Features, policy: Policy) -> Outlook:
+        """Foresee what the policy would do at full speed, beginning with what was foreseen before if it has come true.
+
+        A robot that was slowed down is on its way there: it is looked at anew where it would have decided anew.
+        """
         drive: list[CourseState] = []
-        if self._outlook is not None and self._outlook.holds(state, policy):
+        if self._outlook is not None and self._outlook.came_true(state, policy):
             drive = self._outlook.drive[1:]
+        elif self._outlook is not None and not self._driving and self._outlook.still_holds(state, policy):
+            return self._outlook
         missing = self._steps - len(drive)
         if not drive:
             drive = self._foresee(state, seen, policy, missing)
         elif not self._ends(drive[-1]):
             drive += self._foresee(drive[-1], None, policy, missing)
-        self._outlook = Outlook(policy, drive)
-        return drive
+        self._outlook = Outlook(policy, state, drive)
+        return self._outlook
 
     def _foresee(self, state: CourseState, seen: Features | None, policy: Policy, steps: int) -> list[CourseState]:
         """Let the policy drive in the second twin; `seen` is what is seen at `state`, where the robot is there."""

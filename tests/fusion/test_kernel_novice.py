@@ -95,7 +95,23 @@ def test_a_label_that_all_others_contradict_is_named_with_who_gave_it():
     (found,) = learner.set_aside()
     assert (found.number, found.source, found.action) == (5, "camera", (1.0, -0.9))
     assert found.others == pytest.approx((1.0, 0.9), abs=0.1)
+    assert not found.mirrored
     assert novice().set_aside() == []
+
+
+def test_of_a_label_that_is_set_aside_it_is_said_whether_itself_or_its_mirror_image():
+    learner = novice(mirrored=True)
+    for _ in range(5):
+        learner.remember(Label(seen(0).mirrored(), (1.0, 0.9), "human"))
+    learner.remember(Label(seen(0), (1.0, 0.9), "camera"))  # the others say -0.9 here, by their mirror images
+    (found,) = learner.set_aside()
+    assert not found.mirrored
+    ridge = learner.ridge
+    assert ridge.aside == {5: 10}
+    assert not ridge.fit.used[10:].any()
+    ridge.fit.used[10] = True  # as where little else is known of what was seen than of its mirror image
+    (found,) = learner.set_aside()
+    assert (found.number, found.action, found.mirrored) == (5, (1.0, 0.9), True)
 
 
 @pytest.mark.parametrize("mirrored", [True, False])
@@ -138,6 +154,15 @@ def test_alone_it_turns_more_than_while_it_is_taught():
     (linear, angular), alone = learner.act(seen(1)), learner.alone(seen(1))
     assert alone == pytest.approx((linear, max(-1.0, min(1.0, 1.4 * angular))))
     assert abs(alone[1]) > abs(angular)
+
+
+@pytest.mark.parametrize("proving", [False, True])
+def test_several_states_at_once_are_answered_as_one_by_one(proving):
+    learner, other = taught(), taught()
+    states = [seen(i) for i in range(5)]
+    one_by_one = [(other.proving if proving else other.alone)(each) for each in states]
+    np.testing.assert_allclose(learner.together(proving=proving)(states), one_by_one, atol=1e-5)
+    assert learner.limit == pytest.approx(other.limit, rel=1e-4)
 
 
 def test_it_knows_what_is_unlike_what_the_human_had_to_show_it():

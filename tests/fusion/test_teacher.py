@@ -68,7 +68,7 @@ class Straight(Crystal):
 
     def rollout(self, state, policy, steps, period_s, ends, first=None):
         self.asked.append((state.x_m, steps, first is not None))
-        return [replace(state, x_m=state.x_m + period_s * k) for k in range(1, steps + 1)]
+        return [replace(state, x_m=state.x_m + period_s * k, linear_m_s=1.0) for k in range(1, steps + 1)]
 
 
 @pytest.fixture
@@ -108,6 +108,43 @@ def test_a_robot_that_is_not_where_it_was_foreseen_is_looked_at_anew(change):
     hand.act(at(0), QUIET, straight)
     hand.act(replace(at(0), **{"x_m": 0.2} | change), QUIET, straight)
     assert [steps for _, steps, _ in future.asked] == [8, 8]
+
+
+class TestSlowedDown:
+    """A robot that calls for feedback drives slowly the way that was foreseen."""
+
+    def asked(self, *drives, policy=straight):
+        future = Straight()
+        hand = teacher(future)
+        hand.act(at(0), CALLED, straight)
+        for step, (x_m, linear_m_s) in enumerate(drives, start=1):
+            hand.act(replace(at(step), x_m=x_m, linear_m_s=linear_m_s), CALLED, policy)
+        return [x_m for x_m, _, _ in future.asked]
+
+    def test_it_is_looked_at_anew_where_it_would_have_decided_anew(self):
+        assert self.asked((0.06, 0.3), (0.12, 0.3), (0.18, 0.3), (0.24, 0.3), (0.30, 0.3)) == [0.0, 0.24]
+
+    def test_one_that_is_as_fast_as_was_foreseen_is_looked_at_wherever_else_it_is(self):
+        assert self.asked((0.1, 1.0)) == [0.0, 0.1]
+
+    def test_another_policy_is_looked_at_at_once(self):
+        assert self.asked((0.06, 0.3), policy=lambda _: (1.0, 0.0)) == [0.0, 0.06]
+
+    def test_what_a_hand_does_was_not_foreseen(self):
+        future = Straight()
+        hand = teacher(future, delay_s=0.0, stray_m=-1.0, free_m=0.0)  # everything is a danger
+        assert hand.act(at(0), QUIET, straight) is not None
+        hand.act(replace(at(1), x_m=0.06, linear_m_s=0.3), QUIET, straight)
+        assert [x_m for x_m, _, _ in future.asked] == [0.0, 0.06]
+
+    def test_a_danger_that_was_foreseen_lasts_until_it_is_looked_at_anew(self, crystal):
+        hand = teacher(crystal, called_delay_s=0.3)
+        crystal.danger = True
+        assert hand.act(at(0), CALLED, straight) is None
+        crystal.danger = False
+        assert hand.act(replace(at(1), x_m=0.06, linear_m_s=0.3), CALLED, straight) is None
+        assert hand.act(replace(at(2), x_m=0.12, linear_m_s=0.3), CALLED, straight) is not None
+        assert crystal.rollouts == 1
 
 
 def test_another_policy_and_one_that_has_learned_are_looked_at_anew():

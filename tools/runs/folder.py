@@ -65,7 +65,7 @@ def in_the_log(path: Path, found: Sequence[Contradiction]) -> list[Contradiction
     places = [(each, *learned[each.number]) for each in found if each.number < len(learned)]
     return [
         ContradictionRecord(
-            number, each.source, label.lap, label.stamp_s - began_s[label.lap], each.action, each.others
+            number, each.source, label.lap, label.stamp_s - began_s[label.lap], each.action, each.others, each.mirrored
         )
         for each, number, label in places
     ]

@@ -67,16 +67,15 @@ def list_labels(args: argparse.Namespace) -> int:
     """Show all labels."""
     from lira.fusion.log.label_edit import read_heads
     from lira.hal.errors import LiraError
-    from lira.tools.labels.relearn import relearn
+    from lira.tools.labels.relearn import contradictions, relearn
     from lira.tools.labels.words import list_rows, list_table
 
     path = args.file[0]
     labels = read_heads(path)
     try:
-        novice, learned = relearn(path)
-        aside = {learned[each.number] for each in novice.set_aside()}
+        aside = contradictions(*relearn(path))
     except LiraError:
-        aside = set()  # no novice is there that could tell
+        aside = {}  # no novice is there that could tell
     rows = list_rows(labels, aside)
     return tell(args, {"file": str(path), "labels": rows}, list_table(rows))
 
@@ -109,8 +108,8 @@ def explain(args: argparse.Namespace) -> int:
     from lira.fusion.log.label_edit import read_heads
     from lira.fusion.log.label_log import read_demonstrations
     from lira.tools.labels.choose import nearest, one_of
-    from lira.tools.labels.relearn import relearn
-    from lira.tools.labels.words import pair, part_rows, part_table
+    from lira.tools.labels.relearn import contradictions, relearn
+    from lira.tools.labels.words import pair, part_rows, part_table, state
     from lira.tools.output.when import when
 
     path = args.file[0]
@@ -123,12 +122,13 @@ def explain(args: argparse.Namespace) -> int:
     seen = next(islice(read_demonstrations(path), at, None)).features
     rows = part_rows(novice.explain(seen), learned, labels)
     action, alone, deviation = novice.act(seen), novice.alone(seen), novice.deviation(seen)
+    became = state(label, contradictions(novice, learned).get(at))
     where = f"label {at} (run {label.run}, lap {label.lap}, {when(label.stamp_s)}) says {pair(label.action)}"
     head = (
-        f"{where} by {label.source}; the novice does {pair(action)}, alone {pair(alone)}, give or take "
+        f"{where} by {label.source} ({became}); the novice does {pair(action)}, alone {pair(alone)}, give or take "
         f"{deviation[0]:.2f}, {deviation[1]:.2f}"
     )
-    found = {"number": at, "action": action, "alone": alone, "deviation": deviation, "parts": rows}
+    found = {"number": at, "state": became, "action": action, "alone": alone, "deviation": deviation, "parts": rows}
     return tell(args, {"file": str(path), **found}, f"{head}\n\n{part_table(rows)}")
 
 
