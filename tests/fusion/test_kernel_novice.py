@@ -12,9 +12,13 @@ from lira.fusion.learning import kernel_novice
 from lira.fusion.learning.kernel_novice import KernelNovice
 from lira.fusion.learning.labels import Label, mirror
 from lira.fusion.learning.novice import LearningSettings
+from lira.fusion.learning.trainer import InlineTrainer
+from lira.fusion.methods.presets import METHODS
 from lira.fusion.policies.kernel import KernelSettings
 from lira.fusion.preprocess import Features
 from lira.hal.errors import StorageError
+from lira.hal.profile import load_profile
+from lira.tools.runs.build import build_method
 
 BINS, FILTERS = 21, 4
 
@@ -52,6 +56,15 @@ def test_what_it_does_already_is_redundant():
     learner.learn(seen(0), (0.9, -0.7), "human", learner.act(seen(0)))
     assert not learner.learn(seen(0), (0.9, -0.7), "human", learner.act(seen(0)))
     assert (learner.stored, len(learner.ridge)) == (1, 2)
+
+
+@pytest.mark.parametrize(("robot", "task", "stored"), [("thesis-sim", "line", False), ("rosbot2", "garden", True)])
+def test_on_a_robot_that_turns_faster_than_anybody_drives_it_smaller_turns_are_another_action(robot, task, stored):
+    profile = load_profile(robot)
+    learner = build_method(METHODS["plus"], profile, 0, InlineTrainer, task).novice
+    shape = {"scan": np.ones(profile.features.bins, np.float32), "image": np.zeros((32, 32), np.float32)}
+    assert learner.learn(Features(**shape), (1.0, -0.06), "camera", (1.0, 0.0)) is stored
+    assert not learner.learn(Features(**shape), (1.0, 0.02), "camera", (1.0, 0.0))
 
 
 @pytest.mark.parametrize("mirrored", [True, False])
