@@ -5,6 +5,7 @@ import difflib
 import importlib
 import signal
 import sys
+from importlib.util import find_spec
 from typing import TYPE_CHECKING, NoReturn, Protocol, cast
 
 from lira.hal.errors import ConfigError, LiraError, MissingExtraError
@@ -104,6 +105,13 @@ def told_of(error: Exception) -> LiraError | None:
         return lifetime.unwritable(error)
     scarce = lifetime.out_of_memory(error) if isinstance(error, MemoryError | RuntimeError | ImportError) else None
     return scarce or blame(error)
+
+
+def require(*packages: str) -> None:
+    """Refuse to begin where one of these is not installed. Raises `MissingExtraError`."""
+    for package in packages:
+        if find_spec(package) is None:
+            raise MissingExtraError(package, EXTRAS[package])
 
 
 def entry() -> NoReturn:

@@ -99,7 +99,7 @@ class KernelNovice(Novice):
             source, action = self._given[number]
             linear, angular = self.ridge.act(self.ridge.x[example])
             mirrored = float(self.ridge.y[example, ANGULAR]) != action[ANGULAR]
-            found.append(Contradiction(number, source, action, (linear, -angular if mirrored else angular)))
+            found.append(Contradiction(number, source, action, (linear, -angular if mirrored else angular), mirrored))
         return found
 
     def explain(self, features: Features) -> list[Part]:

@@ -32,12 +32,16 @@ class Part:
 
 @dataclass(frozen=True, slots=True)
 class Contradiction:
-    """A label that is not followed, since the others say otherwise of what was seen there: `others`."""
+    """A label that is not followed, since the others say otherwise of what was seen there: `others`.
+
+    `mirrored`: it is followed itself; left and right exchanged it is not.
+    """
 
     number: int
     source: str
     action: Action
     others: Action
+    mirrored: bool = False
 
 
 class LearnedPolicy:

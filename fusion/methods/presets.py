@@ -95,9 +95,12 @@ class Preset(msgspec.Struct, frozen=True):
         return self.approach.kind
 
     @property
-    def trains(self) -> bool:
-        """Whether its novice is a network, which torch trains; of a method of somebody's own nobody knows."""
-        return self.kernel is None and not isinstance(self.approach, OwnSettings | SwitchingSettings)
+    def packages(self) -> tuple[str, ...]:
+        """What has to be installed to teach by it: torch, where a network is trained. A method of one's own may ask."""
+        if isinstance(self.approach, OwnSettings | SwitchingSettings):
+            return ()
+        probes = isinstance(self.approach, LazyDaggerSettings | ThriftyDaggerSettings)
+        return ("torch",) if self.kernel is None or probes else ()
 
     def starting(self, who: str) -> "Preset":
         """Return the same with another driver before the first training step. Raises `ConfigError`."""

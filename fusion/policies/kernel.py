@@ -233,8 +233,10 @@ class KernelRidge:
     @property
     def aside(self) -> dict[int, int]:
         """The labels of which an example is set aside, and the first such example of each."""
-        examples = np.flatnonzero(~self.fit.used)[::-1]
-        return dict(sorted((int(self.labels[i]), int(i)) for i in examples))
+        first: dict[int, int] = {}
+        for example in np.flatnonzero(~self.fit.used).tolist():
+            first.setdefault(int(self.labels[example]), example)
+        return first
 
     def shares(self, x: FloatArray) -> Doubles:
         """What each example adds to m(x) [n, 2]: m(x) = w(x)^T Y with w(x) = P k(x)."""

@@ -15,6 +15,7 @@ import numpy as np
 from msgspec import Meta
 from numpy.typing import NDArray
 
+from lira.fusion.learning.novice import HAND_TURN_RAD_S
 from lira.fusion.methods.base import Policy, Proposal
 from lira.fusion.preprocess import Features, Look, Preprocessor
 from lira.fusion.teaching.foresight import Foresight
@@ -41,7 +42,7 @@ class TeacherSettings(Table, frozen=True):
     wander_rad: float = 0.1  # a larger turn within the horizon, without a box in the way, is wrong then
     safe_steps: int = 3
     longest_s: float = 20.0  # after so long in control a hand gives up: whatever it does there does not help
-    turn_rad_s: float = 1.1  # a hand turns a robot no faster, whatever the robot can do
+    turn_rad_s: float = HAND_TURN_RAD_S
     delay_s: float = 0.6  # median of the log-normal reaction delay
     called_delay_s: float = 0.35
     delay_sigma: float = 0.3
@@ -156,10 +157,14 @@ class ScriptedTeacher:
             return None
         if self._random.random() < self._settings.wrong_direction:
             return list(offers)[int(self._random.integers(len(offers)))]
-        for name, policy in offers.items():
-            if not self._goes_wrong(state, self._foresee(state, seen, policy, self._steps)):
-                return name
-        return None
+        return next((name for name, policy in offers.items() if self._trusts(policy, state, seen)), None)
+
+    def _trusts(self, policy: Policy, state: CourseState, seen: Features) -> bool:
+        """Whether a policy does well for two horizons: what goes wrong in the second would be taken from it at once."""
+        near = self._foresee(state, seen, policy, self._steps)
+        if self._goes_wrong(state, near):
+            return False
+        return not self._goes_wrong(near[-1], self._foresee(near[-1], None, policy, self._steps))
 
     def _danger(self, state: CourseState, proposal: Proposal, policy: Policy) -> bool:
         """Whether the policy goes wrong; it does not where no policy could."""

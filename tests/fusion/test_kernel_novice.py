@@ -12,9 +12,13 @@ from lira.fusion.learning import kernel_novice
 from lira.fusion.learning.kernel_novice import KernelNovice
 from lira.fusion.learning.labels import Label, mirror
 from lira.fusion.learning.novice import LearningSettings
+from lira.fusion.learning.trainer import InlineTrainer
+from lira.fusion.methods.presets import METHODS
 from lira.fusion.policies.kernel import KernelSettings
 from lira.fusion.preprocess import Features
 from lira.hal.errors import StorageError
+from lira.hal.profile import load_profile
+from lira.tools.runs.build import build_method
 
 BINS, FILTERS = 21, 4
 
@@ -54,6 +58,15 @@ def test_what_it_does_already_is_redundant():
     assert (learner.stored, len(learner.ridge)) == (1, 2)
 
 
+@pytest.mark.parametrize(("robot", "task", "stored"), [("thesis-sim", "line", False), ("rosbot2", "garden", True)])
+def test_on_a_robot_that_turns_faster_than_anybody_drives_it_smaller_turns_are_another_action(robot, task, stored):
+    profile = load_profile(robot)
+    learner = build_method(METHODS["plus"], profile, 0, InlineTrainer, task).novice
+    shape = {"scan": np.ones(profile.features.bins, np.float32), "image": np.zeros((32, 32), np.float32)}
+    assert learner.learn(Features(**shape), (1.0, -0.06), "camera", (1.0, 0.0)) is stored
+    assert not learner.learn(Features(**shape), (1.0, 0.02), "camera", (1.0, 0.0))
+
+
 @pytest.mark.parametrize("mirrored", [True, False])
 def test_left_and_right_are_exchanged_where_it_is_asked_to(mirrored):
     learner = novice(mirrored=mirrored)
@@ -82,7 +95,23 @@ def test_a_label_that_all_others_contradict_is_named_with_who_gave_it():
     (found,) = learner.set_aside()
     assert (found.number, found.source, found.action) == (5, "camera", (1.0, -0.9))
     assert found.others == pytest.approx((1.0, 0.9), abs=0.1)
+    assert not found.mirrored
     assert novice().set_aside() == []
+
+
+def test_of_a_label_that_is_set_aside_it_is_said_whether_itself_or_its_mirror_image():
+    learner = novice(mirrored=True)
+    for _ in range(5):
+        learner.remember(Label(seen(0).mirrored(), (1.0, 0.9), "human"))
+    learner.remember(Label(seen(0), (1.0, 0.9), "camera"))  # the others say -0.9 here, by their mirror images
+    (found,) = learner.set_aside()
+    assert not found.mirrored
+    ridge = learner.ridge
+    assert ridge.aside == {5: 10}
+    assert not ridge.fit.used[10:].any()
+    ridge.fit.used[10] = True  # as where little else is known of what was seen than of its mirror image
+    (found,) = learner.set_aside()
+    assert (found.number, found.action, found.mirrored) == (5, (1.0, 0.9), True)
 
 
 @pytest.mark.parametrize("mirrored", [True, False])

@@ -1,5 +1,6 @@
 """The scripted teacher: when it takes control and lets go, in a made-up future, and that nothing is hit in a twin."""
 
+import math
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -198,6 +199,32 @@ def test_a_human_reacts_after_a_while_and_sooner_when_called(crystal):
 
 def test_a_danger_that_passes_before_the_hand_moves_is_left_alone(crystal):
     assert drive(teacher(crystal, delay_s=0.6), crystal, "xx.xx.xxxx") == "---------H"
+
+
+class Late(Straight):
+    """A foresight in which who goes straight on collides beyond `end_m`, who turns never, and who is slow at once."""
+
+    def __init__(self, end_m):
+        super().__init__()
+        self.end_m = end_m
+
+    def rollout(self, state, policy, steps, period_s, ends, first=None):
+        linear, angular = self.does = first or self.does
+        drive = super().rollout(state, policy, steps, period_s, ends, first)
+        end_m = 0.0 if linear < 1.0 else self.end_m if angular == 0.0 else math.inf
+        return [replace(each, collided=each.x_m > end_m) for each in drive]
+
+
+@pytest.mark.parametrize(("end_m", "given"), [(1.0, "lidar"), (2.8, "lidar"), (4.0, "camera")])
+def test_control_is_given_to_the_first_expert_that_does_well_for_two_horizons(end_m, given):
+    experts = {"camera": straight, "lidar": lambda _: (1.0, 0.1)}
+    only = {"camera": straight}
+    answers = [
+        ScriptedTeacher(Late(end_m), PROFILE, PERFECT, 0).act(at(0), QUIET, lambda _: (0.9, 0.0), offers)
+        for offers in (experts, only)
+    ]
+    assert answers[0] == given
+    assert (answers[1] == "camera") == (given == "camera")  # else it drives itself
 
 
 def test_a_missed_danger_is_seen_late_and_so_a_robot_that_stands_and_asks_does_not_stand_for_ever(crystal):

@@ -209,9 +209,11 @@ def test_the_demo_names_a_folder_that_cannot_be_made(refused, tmp_path):
 @pytest.mark.parametrize(
     ("package", "extra", "words"),
     [
-        ("torch", "learn", ["fusion", "--method", "plus"]),
+        ("torch", "learn", ["fusion", "--method", "lira"]),
         ("safetensors", "drive", ["drive", "camera-expert"]),
-        ("torch", "learn", ["demo"]),
+        ("torch", "learn", ["teach", "--method", "hg-dagger"]),
+        ("torch", "learn", ["demo", "--method", "lazy-dagger-kernel"]),
+        ("safetensors", "drive", ["demo"]),
     ],
 )
 def test_a_missing_extra_says_what_to_install(package, extra, words, tmp_path):

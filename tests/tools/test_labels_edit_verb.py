@@ -102,13 +102,30 @@ def test_what_makes_an_action_is_named_and_adds_up(folder, capsys):
     assert likest == {4, 5}
     assert {part["number"] for part in found["parts"]} == set(range(10))
     status, said = lira(capsys, "explain", folder / LABELS, "--time", "0.81")
-    assert said.out.startswith("label 4 (run 0, lap 1, 0.8 s) says +1.00, +0.00 by human; the novice does +")
+    assert said.out.startswith("label 4 (run 0, lap 1, 0.8 s) says +1.00, +0.00 by human (learned); the novice does +")
+
+
+def test_what_became_of_a_label_is_told_alike_by_list_and_explain_whatever_was_undone(folder, capsys):
+    def told(number):
+        rows = lira(capsys, "list", folder / LABELS)[1].out.splitlines()[-len(GIVEN) :]
+        became = lira(capsys, "explain", folder / LABELS, "--number", str(number))[1].out
+        state = became.partition("(run 0")[2].partition("(")[2].partition(")")[0]
+        assert rows[number].endswith(state)
+        return state
+
+    assert told(6) == "contradicts the rest"
+    lira(capsys, "undo", folder / LABELS, "--number", "6")
+    assert told(6) == "taken back"
+    lira(capsys, "redo", folder / LABELS, "--number", "6")
+    assert told(6) == "contradicts the rest"
+    lira(capsys, "undo", folder / LABELS, "--number", "0-3", "7-9")  # nobody is left whom it could contradict
+    assert told(6) == "learned"
 
 
 def test_two_logs_become_one(folder, capsys, tmp_path):
     status, said = lira(capsys, "merge", folder / LABELS, folder / LABELS, "-o", tmp_path / "both.lira")
     assert status == 0
-    assert "10 labels; 10 of them are in both, and kept once" in said.out
+    assert "10 labels given; 10 of them are in both, and kept once" in said.out
 
 
 @pytest.mark.parametrize(

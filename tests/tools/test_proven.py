@@ -3,8 +3,8 @@
 import pytest
 from made_up_outcomes import lap
 
-from lira.fusion.log.run_log import ResultRecord
-from lira.tools.output.proven import proof_words, share, share_words, unseen_words
+from lira.fusion.log.run_log import ContradictionRecord, ResultRecord
+from lira.tools.output.proven import contradiction_words, proof_words, share, share_words, unseen_words
 
 
 @pytest.mark.parametrize(
@@ -62,3 +62,13 @@ def test_what_went_wrong_on_unseen_layouts_is_said():
         "alone it passed 1 of 3 unseen layouts; 95 %: 1 to 91 %; collisions: 2, lost lines: 1"
     )
     assert unseen_words([]) == ""
+
+
+def test_a_label_whose_mirror_image_alone_contradicts_is_not_said_to_be_left_out():
+    itself = ContradictionRecord(7, "human", 1, 78.6, (0.0, -1.0), (0.4, 0.36))
+    image = ContradictionRecord(3, "human", 1, 5.4, (0.0, 1.0), (0.0, -0.82), mirrored=True)
+    own = "this label contradicts the rest and is not followed: 7 (human, lap 1, 78.6 s into it: turn -1.00, the "
+    assert contradiction_words([itself]) == f"{own}others +0.36)"
+    mirrored = "the mirror image of this label contradicts the rest and is not followed: 3 (human, lap 1, 5.4 s into "
+    assert contradiction_words([image, itself]) == (f"{own}others +0.36); {mirrored}it: turn -1.00, the others +0.82)")
+    assert "the mirror images of these 2 labels contradict the rest and are" in contradiction_words([image, image])

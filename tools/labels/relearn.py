@@ -1,5 +1,6 @@
 """A kernel novice from the log of its labels: to say why it does what it does, and without what was taken back."""
 
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -7,6 +8,7 @@ from lira.fusion.inference.checkpoint import load_checkpoint, save_checkpoint
 from lira.fusion.inference.kernel_net import KernelNet
 from lira.fusion.learning.kernel_novice import KernelNovice
 from lira.fusion.learning.labels import Label
+from lira.fusion.learning.learned_policy import Contradiction
 from lira.fusion.log.label_log import read_demonstrations
 from lira.fusion.log.run_log import RunRecord, read_run
 from lira.fusion.methods.presets import METHODS, Preset
@@ -32,6 +34,11 @@ def relearn(log: Path) -> tuple[KernelNovice, list[int]]:
             novice.remember(Label(label.features, label.action, label.source, novice.weight(label.source)))
             learned.append(number)
     return novice, learned
+
+
+def contradictions(novice: KernelNovice, learned: Sequence[int]) -> dict[int, Contradiction]:
+    """Which labels contradict the others, by their numbers in the log that it learned."""
+    return {learned[each.number]: each for each in novice.set_aside()}
 
 
 def preset_of(folder: Path) -> Preset:

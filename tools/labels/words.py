@@ -1,9 +1,9 @@
 """A log of labels in words: tables for a person, rows for JSON."""
 
-from collections.abc import Collection, Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
-from lira.fusion.learning.learned_policy import Part
+from lira.fusion.learning.learned_policy import Contradiction, Part
 from lira.fusion.log.label_file import Demonstration
 from lira.tools.output.table import format_table
 
@@ -12,13 +12,15 @@ EXPLAINED = ("number", "run", "lap", "time", "source", "says speed, turn", "like
 SHOWN = 10
 
 
-def state(label: Demonstration, aside: bool) -> str:
-    """What became of a label."""
+def state(label: Demonstration, aside: Contradiction | None) -> str:
+    """What became of a label; `aside` is how it contradicts the others, if it does."""
     if label.undone:
         return "taken back"
     if not label.stored:
         return "redundant or objected to"
-    return "contradicts the rest" if aside else "learned"
+    if aside is None:
+        return "learned"
+    return "learned; its mirror image contradicts the rest" if aside.mirrored else "contradicts the rest"
 
 
 def pair(action: tuple[float, float]) -> str:
@@ -26,8 +28,8 @@ def pair(action: tuple[float, float]) -> str:
     return f"{action[0]:+.2f}, {action[1]:+.2f}"
 
 
-def list_rows(labels: Sequence[Demonstration], aside: Collection[int]) -> list[dict[str, Any]]:
-    """All labels, for JSON."""
+def list_rows(labels: Sequence[Demonstration], aside: Mapping[int, Contradiction]) -> list[dict[str, Any]]:
+    """All labels, for JSON; `aside` are those that contradict the others, by their numbers in the log."""
     return [
         {
             "number": number,
@@ -37,7 +39,7 @@ def list_rows(labels: Sequence[Demonstration], aside: Collection[int]) -> list[d
             "source": label.source,
             "action": label.action,
             "novice": label.novice,
-            "state": state(label, number in aside),
+            "state": state(label, aside.get(number)),
         }
         for number, label in enumerate(labels)
     ]

@@ -1,12 +1,11 @@
 """The words by which `lira up` and `lira deploy laptop` are told what shall run, and the set-up that they mean."""
 
 import argparse
-from importlib.util import find_spec
 from pathlib import Path
 from typing import NamedTuple
 
 from lira.hal.bus.endpoint import DEFAULT_ENDPOINT, DEFAULT_ROBOT
-from lira.hal.errors import ConfigError, MissingExtraError
+from lira.hal.errors import ConfigError
 from lira.tools.lifecycle.setup import PAGE_PORT, PORT, Setup, endpoint_of, run_folder
 from lira.tools.lifecycle.table import SETS, chosen, rows
 from lira.tools.options import DEFAULT, add_layout, add_seed
@@ -74,20 +73,21 @@ def setup_of(args: argparse.Namespace, ports: Ports) -> Setup:
 
 def check_packages(setup: Setup) -> None:
     """Refuse what lacks a package before anything starts. Raises `MissingExtraError`."""
-    from lira.tools.cli import EXTRAS
+    from lira.tools.cli import require
 
     for process in rows(setup):
-        for package in process.packages:
-            if find_spec(package) is None:
-                raise MissingExtraError(package, EXTRAS[package])
+        require(*process.packages)
 
 
 def check_method(setup: Setup) -> None:
-    """Refuse a method by which nobody learns. It loads the learner's libraries. Raises `ConfigError`."""
+    """Refuse a method by which nobody learns, or that lacks a package. Raises `ConfigError`, `MissingExtraError`."""
     if "learner" in setup.processes:
         from lira.fusion.methods.presets import method_named
+        from lira.tools.cli import require
 
-        if not method_named(setup.method).approach.learns:
+        preset = method_named(setup.method)
+        require(*preset.packages)
+        if not preset.approach.learns:
             raise ConfigError(f"by the method '{setup.method}' nobody learns", "Choose another --method.")
 
 

@@ -92,7 +92,7 @@ PROCESSES: tuple[Process, ...] = (
         lambda setup: ["record", *_reach(setup), "--run", setup.folder],
         packages=("mcap",),
     ),
-    Process("learner", "decides, drives and learns", _learner, packages=("torch",)),
+    Process("learner", "decides, drives and learns", _learner, packages=("safetensors",)),
     Process("driver", "lets one policy drive", _driver, packages=("safetensors",)),
     Process("page", "shows the robot in a browser, and drives it from there", _page, packages=("aiohttp", "segno")),
     Process("pad", "a gamepad on this machine, straight to the robot", lambda setup: ["joystick", *_reach(setup)]),

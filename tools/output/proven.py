@@ -47,15 +47,24 @@ def unseen_words(laps: Sequence[LapRecord]) -> str:
 
 def contradiction_words(found: Sequence[ContradictionRecord]) -> str:
     """Which labels the novice does not follow, for whoever gave them to look at; empty where there are none."""
-    if not found:
-        return ""
-    label = "this label contradicts" if len(found) == 1 else f"these {len(found)} labels contradict"
-    each = [
-        f"{one.number} ({one.source}, lap {one.lap}, {one.stamp_s:.1f} s into it: "
-        f"turn {one.action[1]:+.2f}, the others {one.others[1]:+.2f})"
-        for one in found
-    ]
-    return f"{label} the rest and {'is' if len(found) == 1 else 'are'} not followed: {', '.join(each)}"
+    said = []
+    for mirrored in (False, True):
+        each = [_contradiction(one) for one in found if one.mirrored == mirrored]
+        which = "this label" if len(each) == 1 else f"these {len(each)} labels"
+        if mirrored:
+            which = f"the mirror image{'' if len(each) == 1 else 's'} of {which}"
+        does, are = ("contradicts", "is") if len(each) == 1 else ("contradict", "are")
+        said += [f"{which} {does} the rest and {are} not followed: {', '.join(each)}"] if each else []
+    return "; ".join(said)
+
+
+def _contradiction(found: ContradictionRecord) -> str:
+    """One of them, as it contradicts the others."""
+    side = -1.0 if found.mirrored else 1.0
+    return (
+        f"{found.number} ({found.source}, lap {found.lap}, {found.stamp_s:.1f} s into it: "
+        f"turn {side * found.action[1]:+.2f}, the others {side * found.others[1]:+.2f})"
+    )
 
 
 def _at_least(passed: int, laps: int, rate: float) -> float:

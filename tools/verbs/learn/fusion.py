@@ -93,8 +93,10 @@ def run(args: argparse.Namespace) -> int:
     """Learn until done or told to stop. Exit status 1 if the novice did not drive alone as it should."""
     from lira.fusion.inference.threads import one_thread
     from lira.hal.client.remote import connect
+    from lira.tools.cli import require
 
     plan = plan_of(args)
+    require(*plan.preset.packages)
     if not plan.preset.approach.learns and args.teacher == "none":
         raise ConfigError(f"by the method '{args.method}' nobody learns", "Show it on a twin with --teacher perfect.")
     one_thread()

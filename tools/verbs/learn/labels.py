@@ -67,18 +67,18 @@ def list_labels(args: argparse.Namespace) -> int:
     """Show all labels."""
     from lira.fusion.log.label_edit import read_heads
     from lira.hal.errors import LiraError
-    from lira.tools.labels.relearn import relearn
+    from lira.tools.labels.relearn import contradictions, relearn
     from lira.tools.labels.words import list_rows, list_table
 
     path = args.file[0]
     labels = read_heads(path)
     try:
-        novice, learned = relearn(path)
-        aside = {learned[each.number] for each in novice.set_aside()}
+        aside = contradictions(*relearn(path))
     except LiraError:
-        aside = set()  # no novice is there that could tell
+        aside = {}  # no novice is there that could tell
     rows = list_rows(labels, aside)
-    return tell(args, {"file": str(path), "labels": rows}, list_table(rows))
+    head = f"{len(labels)} labels given, {sum(label.stored for label in labels)} of them learned"
+    return tell(args, {"file": str(path), "labels": rows}, f"{head}\n\n{list_table(rows)}")
 
 
 def undo(args: argparse.Namespace) -> int:
@@ -109,8 +109,8 @@ def explain(args: argparse.Namespace) -> int:
     from lira.fusion.log.label_edit import read_heads
     from lira.fusion.log.label_log import read_demonstrations
     from lira.tools.labels.choose import nearest, one_of
-    from lira.tools.labels.relearn import relearn
-    from lira.tools.labels.words import pair, part_rows, part_table
+    from lira.tools.labels.relearn import contradictions, relearn
+    from lira.tools.labels.words import pair, part_rows, part_table, state
     from lira.tools.output.when import when
 
     path = args.file[0]
@@ -123,12 +123,13 @@ def explain(args: argparse.Namespace) -> int:
     seen = next(islice(read_demonstrations(path), at, None)).features
     rows = part_rows(novice.explain(seen), learned, labels)
     action, alone, deviation = novice.act(seen), novice.alone(seen), novice.deviation(seen)
+    became = state(label, contradictions(novice, learned).get(at))
     where = f"label {at} (run {label.run}, lap {label.lap}, {when(label.stamp_s)}) says {pair(label.action)}"
     head = (
-        f"{where} by {label.source}; the novice does {pair(action)}, alone {pair(alone)}, give or take "
+        f"{where} by {label.source} ({became}); the novice does {pair(action)}, alone {pair(alone)}, give or take "
         f"{deviation[0]:.2f}, {deviation[1]:.2f}"
     )
-    found = {"number": at, "action": action, "alone": alone, "deviation": deviation, "parts": rows}
+    found = {"number": at, "state": became, "action": action, "alone": alone, "deviation": deviation, "parts": rows}
     return tell(args, {"file": str(path), **found}, f"{head}\n\n{part_table(rows)}")
 
 
@@ -141,7 +142,9 @@ def merge(args: argparse.Namespace) -> int:
     one, other = args.file
     count, both = label_edit.merge(one, other, args.output)
     twice = f"; {both} of them are in both, and kept once" if both else ""
-    words = f"{args.output}: {count} labels{twice}\nto go on with them: put it into a folder as labels.lira, then "
+    words = (
+        f"{args.output}: {count} labels given{twice}\nto go on with them: put it into a folder as labels.lira, then "
+    )
     words += "lira fusion --method NAME --run DIR"
     return tell(args, {"file": str(args.output), "labels": count, "in_both": both}, words)
 
@@ -206,7 +209,7 @@ def row(path: Path, found: "Survey", kept: Path | None) -> dict[str, Any]:
 
 def words(path: Path, found: "Survey", kept: Path | None) -> str:
     """What was found, for a person."""
-    lines = [f"{path}: {found.count} labels of '{found.form.profile}' in {found.newest_run + 1} runs"]
+    lines = [f"{path}: {found.count} labels given, of '{found.form.profile}' in {found.newest_run + 1} run(s)"]
     if not found.words():
         lines.append("  nothing is damaged")
     else:

@@ -24,11 +24,10 @@ import sys
 import time
 from collections.abc import Sequence
 from datetime import datetime
-from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from lira.hal.errors import ConfigError, MissingExtraError
+from lira.hal.errors import ConfigError
 from lira.hal.messages import Phase
 from lira.tools.options import add_expert, add_layout, add_protocol, add_randomise, add_record, add_seed, natural
 
@@ -36,9 +35,6 @@ if TYPE_CHECKING:
     from lira.tools.launch.launch import Part
     from lira.tools.launch.processes import ChildProcess
 
-NEEDED = {"safetensors": "drive"}  # and the extra that brings it
-NEEDED_BY_NETWORKS = {"torch": "learn"}
-NEEDED_BY_WIRE = {"serial": "robot"}
 POLL_S = 0.1
 STALL_S = 60.0
 
@@ -78,6 +74,7 @@ def run(args: argparse.Namespace) -> int:
     from lira.fusion.methods.presets import method_named
     from lira.hal.profile import load_profile
     from lira.sim_backend.catalogue import load_world
+    from lira.tools.cli import require
     from lira.tools.launch.launch import direct, twin_words, wired
     from lira.tools.launch.processes import free_port, lira_command
 
@@ -90,13 +87,7 @@ def run(args: argparse.Namespace) -> int:
     for expert in experts_of(profile):
         expert_path(expert, profile, task)
     preset = method_named(args.method).taught(layouts=args.layouts, proof=args.proof)
-    for package, extra in {
-        **NEEDED,
-        **(NEEDED_BY_NETWORKS if preset.trains else {}),
-        **(NEEDED_BY_WIRE if args.wire else {}),
-    }.items():
-        if find_spec(package) is None:
-            raise MissingExtraError(package, extra)
+    require("safetensors", *preset.packages, *(["serial"] if args.wire else []))
     from lira.fusion.experts.load import load_policy  # not sooner: it takes the learner's libraries
 
     for expert in args.expert:
@@ -195,6 +186,7 @@ def raise_dead(parts: Sequence["ChildProcess"]) -> None:
 
 def conclude(folder: Path) -> int:
     """Print the table, write the report, and return 0 if the novice was proven and passed every unseen layout."""
+    from lira.tools.output.label_words import learned_words
     from lira.tools.output.proven import contradiction_words, proof_words, unseen_words
     from lira.tools.output.table import format_table
     from lira.tools.report import RECORD, write_report
@@ -207,7 +199,7 @@ def conclude(folder: Path) -> int:
     proven = run.result is not None and run.result.converged
     said = [unseen_words(unseen)]
     if run.result is not None:
-        said += [proof_words(run.result), contradiction_words(run.result.contradictions)]
+        said += [learned_words(run.result), proof_words(run.result), contradiction_words(run.result.contradictions)]
     for words in filter(None, said):
         print(words)
     print(f"report: {write_report(folder)}")

@@ -92,6 +92,7 @@ def run(args: argparse.Namespace) -> int:
     """Hold the session, and leave a report."""
     from lira.fusion.inference.threads import one_thread
     from lira.hal.client.remote import connect
+    from lira.tools.cli import require
     from lira.tools.launch.lifetime import CLOSE_S
     from lira.tools.live.rules import Rules
     from lira.tools.live.sitting import sit
@@ -101,6 +102,7 @@ def run(args: argparse.Namespace) -> int:
     args.run = args.run or Path("runs") / f"teach-{args.who}-{datetime.now():%Y%m%d-%H%M%S}"
     args.laps = args.laps or (SCRIPT_LAPS if scripted else LAPS)
     plan = plan_of(args)
+    require(*plan.preset.packages)
     one_thread()
     args.speed = args.speed or (SCRIPT_SPEED if scripted else 1.0)
     practice_s = args.practice if args.practice is not None else 2.0 if scripted else 15.0
@@ -177,6 +179,7 @@ def script_of(args: argparse.Namespace) -> Iterator[None]:
 
 def conclude(folder: Path, passed: bool | None, shown_as: str) -> int:
     """Write the report, and say where it is and what to do with it."""
+    from lira.tools.output.label_words import learned_words
     from lira.tools.output.table import format_table
     from lira.tools.report import RECORD, write_report
     from lira.tools.report.digest import load_run
@@ -184,6 +187,8 @@ def conclude(folder: Path, passed: bool | None, shown_as: str) -> int:
 
     recorded = load_run(folder / RECORD)
     print(f"\n{format_table(COLUMNS, [lap_cells(lap) for lap in recorded.laps])}\n")
+    if recorded.result is not None:
+        print(learned_words(recorded.result))
     if recorded.verdict is not None:
         print(f"{recorded.verdict.words}.")
     print(f"report: {write_report(folder, shown_as)}")
