@@ -9,6 +9,9 @@ EXPERTS := $(foreach task,line eight passage garden corridor,camera:--task:$(tas
   $(foreach task,line passage garden,lidar:--task:$(task)) depth:--task:table-top
 BENCHES := twin lockstep latency train preprocess step log drivers takeover web
 
+# Where nothing is kept of what was compiled, each of hundreds of processes compiles it again.
+unexport PYTHONDONTWRITEBYTECODE
+
 .DEFAULT_GOAL := help
 .PHONY: help setup foreign demo test test-fast test-long check docs generated bench results experts wheel clean
 

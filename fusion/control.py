@@ -30,6 +30,14 @@ class Teacher(Protocol):
 
 
 @dataclass(frozen=True, slots=True)
+class Sight:
+    """What a decision is about: an observation that could be used, and what the networks see of it."""
+
+    observation: Observation
+    features: Features
+
+
+@dataclass(frozen=True, slots=True)
 class Step:
     """One pass of the loop. `state` is ground truth where there is any."""
 
@@ -56,6 +64,7 @@ class ControlLoop:
 
     def __init__(self, robot: Robot, truth: Callable[[], CourseState | None] | None = None) -> None:
         self._robot = robot
+        self._restartable = robot if isinstance(robot, Restartable) else None
         self._truth = truth
         self._base = robot.profile.base
         self._period_s = robot.profile.period_s
@@ -86,14 +95,22 @@ class ControlLoop:
 
     def step(self, method: Method, teacher: Teacher | None = None) -> Step | None:
         """Make one decision and let its period pass. Returns None if a sensor was stale or unusable: it stops then."""
+        sight = self.look(method)
+        return None if sight is None else self.follow(method, sight, self._propose(method, sight.features), teacher)
+
+    def look(self, method: Method) -> Sight | None:
+        """The first half of a step: see what is to be decided on. None if a sensor was stale or unusable."""
         method.update(self._robot.now())
         observation = self._robot.read()
         features = self._features(observation)
         if features is None:
             self._stand(observation)
             return None
-        proposal = self._propose(method, features)
-        state = self.truth()
+        return Sight(observation, features)
+
+    def follow(self, method: Method, sight: Sight, proposal: Proposal, teacher: Teacher | None = None) -> Step:
+        """The second half: do what is proposed, or what the teacher does instead, learn, and let the period pass."""
+        observation, state = sight.observation, self.truth()
         if teacher is not None and state is not None:
             offers = method.offers if isinstance(method, Chooser) else {}
             answer = teacher.act(state, proposal, self._driving_policy(method, proposal), offers)
@@ -114,7 +131,7 @@ class ControlLoop:
 
         Raises `BusError` if another robot came in its place.
         """
-        return isinstance(self._robot, Restartable) and self._robot.started_anew()
+        return self._restartable is not None and self._restartable.started_anew()
 
     def stand(self) -> None:
         """Let one period pass without a decision: the robot stands, unless a hand drives it."""

@@ -3,6 +3,7 @@
 import math
 import threading
 import time
+from collections.abc import Iterator
 
 import msgspec
 
@@ -200,6 +201,13 @@ def judge_command(command: Command, base: Base, stamp_s: float) -> Applied:
         min(max(asked.linear_m_s, -base.max_linear_m_s), base.max_linear_m_s),
         min(max(asked.angular_rad_s, -base.max_angular_rad_s), base.max_angular_rad_s),
     )
-    pairs = {"linear": (twist.linear_m_s, asked.linear_m_s), "angular": (twist.angular_rad_s, asked.angular_rad_s)}
-    clamps = tuple(name for name, (got, wanted) in pairs.items() if got != wanted)
+    clamps = () if twist == asked else tuple(_clamped(asked, twist))
     return Applied(twist, stamp_s, command.source, Reason.OK, clamps, command.answers, age_s)
+
+
+def _clamped(asked: Twist, got: Twist) -> Iterator[str]:
+    """Which parts of a command were cut."""
+    if got.linear_m_s != asked.linear_m_s:
+        yield "linear"
+    if got.angular_rad_s != asked.angular_rad_s:
+        yield "angular"

@@ -32,6 +32,11 @@ class Dense:
         np.add(y, self._bias, out=y)
         return leaky_relu(y, self._scratch) if self._rectified else y
 
+    def all(self, x: FloatArray) -> FloatArray:
+        """Return y [n, out] of several x [n, in], in memory of its own."""
+        y: FloatArray = x @ self._weight.T + self._bias
+        return leaky_relu(y, np.empty_like(y)) if self._rectified else y
+
 
 class Convolution:
     """3 x 3, valid, stride 1: the patches as columns (im2col), and one product of matrices.

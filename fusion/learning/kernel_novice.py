@@ -1,13 +1,14 @@
 """The novice of `policies/kernel.py`: it learns from each label at once, and says how sure it is."""
 
 import math
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
 
 from lira.fusion.inference.kernel_net import NEVER, Doubles, KernelNet
 from lira.fusion.learning.labels import Label, mirror
-from lira.fusion.learning.learned_policy import Contradiction, Part
+from lira.fusion.learning.learned_policy import Contradiction, Part, Together
 from lira.fusion.learning.novice import LearningSettings, Novice
 from lira.fusion.policies.kernel import ANGULAR, KernelRidge, KernelSettings
 from lira.fusion.preprocess import Features
@@ -44,10 +45,19 @@ class KernelNovice(Novice):
 
     def proving(self, features: Features) -> Action:
         """The same. What it meets in the runs that prove it, it knows: the measure of its doubt afterwards."""
-        self._met.append(self.ridge.k(self._x(features)))
-        if len(self._met) == MOST_MET:
-            self._measure_doubt()
+        self._meet(self.ridge.k(self._x(features))[None])
         return self.alone(features)
+
+    def together(self, *, proving: bool) -> Together:
+        """m(x) of several states with the turn times g."""
+
+        def act(seen: Sequence[Features]) -> list[Action]:
+            k = self.ridge.k(np.stack([self._x(each) for each in seen]))
+            if proving:
+                self._meet(k)
+            return self.ridge.actions(k, self.ridge.gain)
+
+        return act
 
     @property
     def limit(self) -> float:
@@ -117,6 +127,12 @@ class KernelNovice(Novice):
             "limit": np.array([min((1.0 + ROUNDING) * self.limit, NEVER)], np.float32),
         }
         return KernelNet(replace(self._network.architecture, examples=int(used.sum())), weights)
+
+    def _meet(self, k: Doubles) -> None:
+        """Keep the kernel values [m, n] of states of a proving run."""
+        self._met.extend(k)
+        if len(self._met) >= MOST_MET:
+            self._measure_doubt()
 
     def _measure_doubt(self) -> None:
         """Take in what it has met: all at once, and only when it matters, which for most laps is never."""

@@ -1,5 +1,6 @@
 """What a method teaches, seen from outside: a policy that takes labels and, now and then, becomes a better one."""
 
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -9,6 +10,9 @@ from lira.hal.messages import Action
 
 if TYPE_CHECKING:
     from lira.fusion.inference.networks import DrivingNet
+
+Together = Callable[[Sequence[Features]], list[Action]]
+"""A policy on what several robots see at one time. It does as it would on each, but for rounding."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -66,6 +70,13 @@ class LearnedPolicy:
     def proving(self, features: Features) -> Action:
         """The same in a run that proves it, from which it may learn what it knows."""
         return self.alone(features)
+
+    def together(self, *, proving: bool) -> Together | None:  # noqa: ARG002
+        """Return what it does alone on what several robots see, as `proving` or as `alone`.
+
+        None where it has to be asked by one robot after the other, as one that remembers what it saw.
+        """
+        return None
 
     def remember(self, label: Label) -> None:  # noqa: ARG002
         """Take in a label."""

@@ -12,12 +12,14 @@ from lira.fusion.inference.architecture import Weights
 from lira.fusion.inference.build import alone
 from lira.fusion.inference.networks import DrivingNet
 from lira.fusion.learning.labels import Label, is_rest
-from lira.fusion.learning.learned_policy import LearnedPolicy
+from lira.fusion.learning.learned_policy import LearnedPolicy, Together
 from lira.fusion.preprocess import Features
 from lira.hal.config import Table
 from lira.hal.messages import Action, Driver
+from lira.hal.profile import Base
 
 CATCH_UP_POLL_S = 0.005
+HAND_TURN_RAD_S = 1.1  # a hand turns a robot no faster, whatever the robot can do
 
 
 class LearningSettings(Table, frozen=True):
@@ -30,6 +32,7 @@ class LearningSettings(Table, frozen=True):
     labels_per_step: int = 30  # m
     redundancy: float = 0.05  # L
     action_range: float = 2.0
+    turn: float = 1.0  # the share of that range which is used in turns, see `used_turn`
     filter_human: bool = True  # False keeps every human label
     human_weight: float = 1.0  # of a human label's squared error
     idle_frames: Literal["label", "skip"] = "label"
@@ -55,9 +58,18 @@ class Trainer(Protocol):
         """End the trainer, in bounded time."""
 
 
-def is_redundant(a: Action, a_n: Action, threshold: float) -> bool:
-    """Whether the novice already does it: every |a_k - a^N_k| < L (section III-C)."""
-    return all(abs(x - y) < threshold for x, y in zip(a, a_n, strict=True))
+def is_redundant(a: Action, a_n: Action, threshold: float, turn: float = 1.0) -> bool:
+    """Whether the novice already does it: every |a_k - a^N_k| < L (section III-C), for the turn a share of L."""
+    return abs(a[0] - a_n[0]) < threshold and abs(a[1] - a_n[1]) < threshold * turn
+
+
+def used_turn(base: Base) -> float:
+    """The share of its turns that a hand uses of a robot.
+
+    Who could turn ten times as fast as anybody drives it would else leave its line for good before a label that sets it
+    right counts as another action.
+    """
+    return min(1.0, HAND_TURN_RAD_S / base.max_angular_rad_s)
 
 
 class Novice(LearnedPolicy, ABC):
@@ -92,9 +104,9 @@ class Novice(LearnedPolicy, ABC):
 
     def learn(self, features: Features, action: Action, source: str, a_n: Action) -> bool:
         """Store a label unless it is redundant; `a_n` is the novice's own action there. Returns whether it was kept."""
-        threshold = self.settings.redundancy * self.settings.action_range
+        threshold, turn = self.settings.redundancy * self.settings.action_range, self.settings.turn
         keep_always = source == Driver.HUMAN and not self.settings.filter_human
-        if not keep_always and is_redundant(action, a_n, threshold):
+        if not keep_always and is_redundant(action, a_n, threshold, turn):
             return False
         self.remember(Label(features, action, source, self.weight(source)))
         return True
@@ -123,6 +135,10 @@ class NetworkNovice(Novice):
     def act(self, features: Features) -> Action:
         """a^N of the current network."""
         return self.network.act(features)
+
+    def together(self, *, proving: bool) -> Together:  # noqa: ARG002 - it does the same
+        """The current network on several observations."""
+        return self.network.act_all
 
     def remember(self, label: Label) -> None:
         """Hand a label to the trainer."""

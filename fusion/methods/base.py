@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import Protocol, runtime_checkable
 
 from lira.fusion.learning.labels import Label
-from lira.fusion.learning.learned_policy import UNTAUGHT, LearnedPolicy
+from lira.fusion.learning.learned_policy import UNTAUGHT, LearnedPolicy, Together
 from lira.fusion.preprocess import Features
 from lira.hal.messages import Action, Call, Driver, ExpertView, Phase
 
@@ -129,6 +129,15 @@ class Method(ABC):
     def propose(self, features: Features) -> Proposal:
         """Decide as if no human were there."""
 
+    @property
+    def drives_several(self) -> bool:
+        """Whether it can drive several robots at once: it does not remember what it saw, and learns nothing."""
+        return False
+
+    def propose_all(self, seen: Sequence[Features]) -> list[Proposal]:
+        """Decide on what several robots see at one time."""
+        return [self.propose(each) for each in seen]
+
     def learn(self, proposal: Proposal, human: Action | None) -> Lesson:
         """Learn from what was executed; `human` is the human's action if the human drove, and then it is the label.
 
@@ -153,7 +162,10 @@ class Method(ABC):
         """Return what drives without a teacher, to be proven or on unseen layouts: the novice, if anybody learns."""
         if not self.learns:
             return self
-        return Alone(Driver.NOVICE, self.novice.proving if phase == Phase.PROVE else self.novice.alone)
+        proving = phase == Phase.PROVE
+        return Alone(
+            Driver.NOVICE, self.novice.proving if proving else self.novice.alone, self.novice.together(proving=proving)
+        )
 
     @property
     def calls_alone(self) -> bool:
@@ -179,14 +191,30 @@ class Chooser(Protocol):
 
 @dataclass(frozen=True, slots=True)
 class Alone(Method):
-    """A policy that drives by itself and learns nothing: an expert on show, or the novice's proving run."""
+    """A policy that drives by itself and learns nothing: an expert on show, or the novice's proving run.
+
+    `together`, if there is one, is the same policy on what several robots see.
+    """
 
     name: str
     act: Policy
+    together: Together | None = None
 
     def propose(self, features: Features) -> Proposal:
         """Propose the policy's own action."""
-        action = self.act(features)
+        return self._proposal(features, self.act(features))
+
+    @property
+    def drives_several(self) -> bool:
+        """Where the policy says what it does together."""
+        return self.together is not None
+
+    def propose_all(self, seen: Sequence[Features]) -> list[Proposal]:
+        """Propose the policy's own actions."""
+        actions = [self.act(each) for each in seen] if self.together is None else self.together(seen)
+        return [self._proposal(*each) for each in zip(seen, actions, strict=True)]
+
+    def _proposal(self, features: Features, action: Action) -> Proposal:
         return Proposal(features, Choice(self.name, action), novice=action)
 
     def policy(self, driver: str) -> Policy:  # noqa: ARG002 - whoever drives, it is this one

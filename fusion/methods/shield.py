@@ -17,6 +17,7 @@ robot itself (`hal/safety`) is another thing: that one stops, whoever drives.
 """
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -111,9 +112,20 @@ class Shielded(Method):
 
     def propose(self, features: Features) -> Proposal:
         """What the method proposes, with a turn that is clear. `Proposal.novice` still says what the novice wanted."""
-        proposal = self._method.propose(features)
+        return self._clear(self._method.propose(features))
+
+    @property
+    def drives_several(self) -> bool:
+        """As without a shield."""
+        return self._method.drives_several
+
+    def propose_all(self, seen: Sequence[Features]) -> list[Proposal]:
+        """The same for several robots."""
+        return [self._clear(proposal) for proposal in self._method.propose_all(seen)]
+
+    def _clear(self, proposal: Proposal) -> Proposal:
         command = proposal.command
-        clear = self._shield(command, features.scan)
+        clear = self._shield(command, proposal.features.scan)
         if clear == command:
             return proposal
         call = Call.FEEDBACK if clear == STAND else proposal.choice.call

@@ -244,8 +244,12 @@ class KernelRidge:
 
     def act(self, x: FloatArray, gain: float = 1.0) -> tuple[float, float]:
         """m(x), the turn times `gain`, clipped."""
-        linear, angular = self.fit.mean(self.k(x)).tolist()
-        return clipped(linear), clipped(gain * angular)
+        (action,) = self.actions(self.k(x)[None], gain)
+        return action
+
+    def actions(self, k: Doubles, gain: float = 1.0) -> list[tuple[float, float]]:
+        """The same of several states, of which these are the kernel values [m, n]."""
+        return [(clipped(linear), clipped(gain * angular)) for linear, angular in self.fit.mean(k).tolist()]
 
     @property
     def gain(self) -> float:

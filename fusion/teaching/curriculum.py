@@ -7,7 +7,7 @@ from itertools import product
 import msgspec
 
 from lira.fusion.experts.tasks import DEFAULT, TASKS
-from lira.fusion.teaching.session import Drive
+from lira.fusion.teaching.ride import Drive
 from lira.fusion.teaching.teacher import PERFECT, SKILLED, TeacherSettings
 from lira.hal.messages import Episode
 

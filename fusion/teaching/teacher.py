@@ -15,6 +15,7 @@ import numpy as np
 from msgspec import Meta
 from numpy.typing import NDArray
 
+from lira.fusion.learning.novice import HAND_TURN_RAD_S
 from lira.fusion.methods.base import STAND, Policy, Proposal
 from lira.fusion.preprocess import Features, Preprocessor
 from lira.fusion.teaching.foresight import Foresight
@@ -41,7 +42,7 @@ class TeacherSettings(Table, frozen=True):
     wander_rad: float = 0.1  # a larger turn within the horizon, without a box in the way, is wrong then
     safe_steps: int = 3
     longest_s: float = 20.0  # after so long in control a hand gives up: whatever it does there does not help
-    turn_rad_s: float = 1.1  # a hand turns a robot no faster, whatever the robot can do
+    turn_rad_s: float = HAND_TURN_RAD_S
     delay_s: float = 0.6  # median of the log-normal reaction delay
     called_delay_s: float = 0.35
     delay_sigma: float = 0.3
@@ -51,6 +52,7 @@ class TeacherSettings(Table, frozen=True):
     notices_s: float = 3.0  # a danger that was missed is seen so much later, if it lasts: a robot that stands and asks
 
 
+SLOWED = 0.5  # of the speed that was foreseen: a robot that is slower is being slowed down
 AS_FORESEEN = 1e-6  # metres, radians and so on: a robot that is so near to where it was foreseen is there
 NOBODY: Mapping[str, Policy] = MappingProxyType({})
 
@@ -62,14 +64,25 @@ TEACHERS = {"scripted": SKILLED, "perfect": PERFECT, "unskilled": UNSKILLED}
 
 @dataclass(frozen=True, slots=True)
 class Outlook:
-    """How a policy was foreseen to drive, state after state."""
+    """How a policy was foreseen to drive from where it `began`, state after state."""
 
     policy: Policy
+    began: CourseState
     drive: list[CourseState]
 
-    def holds(self, state: CourseState, policy: Policy) -> bool:
+    def came_true(self, state: CourseState, policy: Policy) -> bool:
         """Whether its first state has come true and the same policy is to drive on, none the wiser."""
         return policy == self.policy and _same_place(state, self.drive[0])
+
+    def still_holds(self, state: CourseState, policy: Policy) -> bool:
+        """Whether the same policy was slowed down, and is not as far yet as it was foreseen to be a step later."""
+        first = self.drive[0]
+        slow = abs(state.linear_m_s) < SLOWED * abs(first.linear_m_s)
+        return slow and policy == self.policy and _gap_m(self.began, state) < _gap_m(self.began, first)
+
+
+def _gap_m(one: CourseState, other: CourseState) -> float:
+    return math.hypot(one.x_m - other.x_m, one.y_m - other.y_m)
 
 
 def _same_place(one: CourseState, other: CourseState) -> bool:
@@ -144,30 +157,40 @@ class ScriptedTeacher:
             return None
         if self._random.random() < self._settings.wrong_direction:
             return list(offers)[int(self._random.integers(len(offers)))]
-        for name, policy in offers.items():
-            if not self._goes_wrong(state, self._foresee(state, seen, policy, self._steps)):
-                return name
-        return None
+        return next((name for name, policy in offers.items() if self._trusts(policy, state, seen)), None)
+
+    def _trusts(self, policy: Policy, state: CourseState, seen: Features) -> bool:
+        """Whether a policy does well for two horizons: what goes wrong in the second would be taken from it at once."""
+        near = self._foresee(state, seen, policy, self._steps)
+        if self._goes_wrong(state, near):
+            return False
+        return not self._goes_wrong(near[-1], self._foresee(near[-1], None, policy, self._steps))
 
     def _danger(self, state: CourseState, proposal: Proposal, policy: Policy) -> bool:
         """Whether the policy goes wrong; it does not where no policy could."""
-        if not self._goes_wrong(state, self._look_ahead(state, proposal.features, policy)):
+        outlook = self._look_ahead(state, proposal.features, policy)
+        if not self._goes_wrong(outlook.began, outlook.drive):
             return False
         slow = proposal.choice.action[0] < self._settings.stall
         return not self._settings.follow_line or slow or self._within_reach(state)
 
-    def _look_ahead(self, state: CourseState, seen: Features, policy: Policy) -> list[CourseState]:
-        """Foresee what the policy would do, beginning with what was foreseen a step ago if it has come true."""
+    def _look_ahead(self, state: CourseState, seen: Features, policy: Policy) -> Outlook:
+        """Foresee what the policy would do at full speed, beginning with what was foreseen before if it has come true.
+
+        A robot that was slowed down is on its way there: it is looked at anew where it would have decided anew.
+        """
         drive: list[CourseState] = []
-        if self._outlook is not None and self._outlook.holds(state, policy):
+        if self._outlook is not None and self._outlook.came_true(state, policy):
             drive = self._outlook.drive[1:]
+        elif self._outlook is not None and not self._driving and self._outlook.still_holds(state, policy):
+            return self._outlook
         missing = self._steps - len(drive)
         if not drive:
             drive = self._foresee(state, seen, policy, missing)
         elif not self._ends(drive[-1]):
             drive += self._foresee(drive[-1], None, policy, missing)
-        self._outlook = Outlook(policy, drive)
-        return drive
+        self._outlook = Outlook(policy, state, drive)
+        return self._outlook
 
     def _foresee(self, state: CourseState, seen: Features | None, policy: Policy, steps: int) -> list[CourseState]:
         """Let the policy drive in the second twin; `seen` is what is seen at `state`, where the robot is there."""

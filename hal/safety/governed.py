@@ -164,6 +164,8 @@ class GovernedRobot:
         self._switch_motors()
         # What is allowed may still not happen: a base that refuses it says why it stands.
         reason = got.reason if allowed.reason is Reason.OK else allowed.reason
+        if reason is allowed.reason and got.twist == allowed.twist and not got.clamps:
+            return allowed
         return replace(allowed, twist=got.twist, reason=reason, clamps=allowed.clamps + got.clamps)
 
     def _switch_motors(self) -> None:

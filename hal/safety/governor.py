@@ -182,7 +182,7 @@ class Governor:
             for command in self._live.values()
             if now_s - command.stamp_s >= self._timeouts_s[command.source] + grace_s
         ]
-        if self._in_charge() in old:
+        if old and self._in_charge() in old:
             self._fire(Event.EXPIRED)
         for command in old:
             del self._live[command.source]
@@ -197,17 +197,18 @@ class Governor:
 
     def _limit(self, wanted: Twist, now_s: float) -> tuple[Twist, tuple[str, ...]]:
         """Cut to the profile's limits, then to what the field allows, then to what can be reached by now."""
-        pair = (wanted.linear_m_s, wanted.angular_rad_s)
-        linear, angular = (min(max(value, -limit), limit) for value, limit in zip(pair, self._limits, strict=True))
-        clamps = [name for name, a, b in zip(("linear", "angular"), pair, (linear, angular), strict=True) if a != b]
+        linear = min(max(wanted.linear_m_s, -self._limits[0]), self._limits[0])
+        angular = min(max(wanted.angular_rad_s, -self._limits[1]), self._limits[1])
+        clamps = ["linear"] if linear != wanted.linear_m_s else []
+        clamps += ["angular"] if angular != wanted.angular_rad_s else []
         if self._field is not None:
             linear, cut = limit_speed(self._field, self.clearance, linear, now_s)
             clamps += [cut] if cut else []
         passed_s = min(now_s - self._last_s, RAMP_S)
-        before = (self._last.linear_m_s, self._last.angular_rad_s)
-        ramped = Twist(*map(_ramp, (linear, angular), before, self._ramps, (passed_s, passed_s)))
-        clamps += ["acceleration"] if ramped != Twist(linear, angular) else []
-        return ramped, tuple(clamps)
+        ramped_linear = _ramp(linear, self._last.linear_m_s, self._ramps[0], passed_s)
+        ramped_angular = _ramp(angular, self._last.angular_rad_s, self._ramps[1], passed_s)
+        clamps += ["acceleration"] if (ramped_linear, ramped_angular) != (linear, angular) else []
+        return Twist(ramped_linear, ramped_angular), tuple(clamps)
 
 
 def _ramp(wanted: float, before: float, limit: float | None, passed_s: float) -> float:

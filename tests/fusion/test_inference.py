@@ -79,6 +79,15 @@ def test_a_kernel_s_page_and_what_drives_agree():
         assert network.deviation(seen) == pytest.approx(ridge.fit.deviation(ridge.k(x)), abs=1e-5)
 
 
+@pytest.mark.parametrize("network", [fusion_net(101, 16), lidar_net(101), kernel_net(101, 16)])
+def test_on_several_observations_at_once_it_does_what_it_does_on_each(network):
+    driver = network.driving() if isinstance(network, torch.nn.Module) else network
+    seen = [noise(101, seed) for seed in range(4)]
+    np.testing.assert_allclose(driver.act_all(seen), [driver.act(each) for each in seen], atol=1e-6)
+    assert driver.act_all(seen) == driver.act_all(seen)
+    assert driver.act_all([]) == []
+
+
 def test_what_experts_and_novice_see_with_the_same_trunk_is_looked_at_once_a_step(monkeypatch):
     looked = []
     look = PictureTrunk._look

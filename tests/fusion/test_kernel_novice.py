@@ -12,9 +12,13 @@ from lira.fusion.learning import kernel_novice
 from lira.fusion.learning.kernel_novice import KernelNovice
 from lira.fusion.learning.labels import Label, mirror
 from lira.fusion.learning.novice import LearningSettings
+from lira.fusion.learning.trainer import InlineTrainer
+from lira.fusion.methods.presets import METHODS
 from lira.fusion.policies.kernel import KernelSettings
 from lira.fusion.preprocess import Features
 from lira.hal.errors import StorageError
+from lira.hal.profile import load_profile
+from lira.tools.runs.build import build_method
 
 BINS, FILTERS = 21, 4
 
@@ -52,6 +56,15 @@ def test_what_it_does_already_is_redundant():
     learner.learn(seen(0), (0.9, -0.7), "human", learner.act(seen(0)))
     assert not learner.learn(seen(0), (0.9, -0.7), "human", learner.act(seen(0)))
     assert (learner.stored, len(learner.ridge)) == (1, 2)
+
+
+@pytest.mark.parametrize(("robot", "task", "stored"), [("thesis-sim", "line", False), ("rosbot2", "garden", True)])
+def test_on_a_robot_that_turns_faster_than_anybody_drives_it_smaller_turns_are_another_action(robot, task, stored):
+    profile = load_profile(robot)
+    learner = build_method(METHODS["plus"], profile, 0, InlineTrainer, task).novice
+    shape = {"scan": np.ones(profile.features.bins, np.float32), "image": np.zeros((32, 32), np.float32)}
+    assert learner.learn(Features(**shape), (1.0, -0.06), "camera", (1.0, 0.0)) is stored
+    assert not learner.learn(Features(**shape), (1.0, 0.02), "camera", (1.0, 0.0))
 
 
 @pytest.mark.parametrize("mirrored", [True, False])
@@ -141,6 +154,15 @@ def test_alone_it_turns_more_than_while_it_is_taught():
     (linear, angular), alone = learner.act(seen(1)), learner.alone(seen(1))
     assert alone == pytest.approx((linear, max(-1.0, min(1.0, 1.4 * angular))))
     assert abs(alone[1]) > abs(angular)
+
+
+@pytest.mark.parametrize("proving", [False, True])
+def test_several_states_at_once_are_answered_as_one_by_one(proving):
+    learner, other = taught(), taught()
+    states = [seen(i) for i in range(5)]
+    one_by_one = [(other.proving if proving else other.alone)(each) for each in states]
+    np.testing.assert_allclose(learner.together(proving=proving)(states), one_by_one, atol=1e-5)
+    assert learner.limit == pytest.approx(other.limit, rel=1e-4)
 
 
 def test_it_knows_what_is_unlike_what_the_human_had_to_show_it():

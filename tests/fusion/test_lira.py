@@ -131,6 +131,9 @@ class FixedNetwork:
     def act(self, seen):
         return self.action
 
+    def act_all(self, seen):
+        return [self.action] * len(seen)
+
     def load_weights(self, weights):
         pass
 

@@ -8,10 +8,11 @@ import pytest
 from lira.fusion.control import ControlLoop
 from lira.fusion.log.recorder import Journal
 from lira.fusion.log.run_log import LapRecord
-from lira.fusion.methods.base import Choice, Lesson, Proposal
-from lira.fusion.teaching.session import LOST_OBSERVATIONS, PUT_BACK_M, PUT_ON_M, Drive, Same, Session
+from lira.fusion.methods.base import Alone, Choice, Lesson, Proposal
+from lira.fusion.teaching.ride import LOST_OBSERVATIONS, PUT_BACK_M, PUT_ON_M, Drive, Place, Ride, Tally, abreast
+from lira.fusion.teaching.session import Same, Session
 from lira.hal.errors import DeviceError
-from lira.hal.messages import Call, Episode
+from lira.hal.messages import Call, Episode, Phase
 from lira.hal.profile import load_profile
 from lira.hal.safety.governed import GovernedRobot
 from lira.hal.testing import NullRobot
@@ -397,3 +398,63 @@ def test_without_an_apprentice_nobody_can_be_taught():
     session, _ = in_doubt(Track())
     with pytest.raises(ValueError, match="nobody to teach"):
         session.teach(Same([Drive(Episode(), NEVER_S)]), Hand(steps=0), 1)
+
+
+class TestAbreast:
+    """Several robots that one policy drives, step by step."""
+
+    FINISHES_M = (1.0, 3.0, 2.0)
+
+    def rides(self, phase=Phase.UNSEEN, **track):
+        """Rides to different finishes, with their records."""
+        made = []
+        for finish_m in self.FINISHES_M:
+            robot = Track(finish_m=finish_m, **track)
+            governed, records = GovernedRobot(robot), []
+            loop = ControlLoop(governed, truth=robot.state)
+            loop.arm()
+            place = Place(governed, robot, loop, Journal(write=records.append))
+            made.append((Ride(place, self.driver, Drive(Episode(), NEVER_S), phase, 1, Tally()), records))
+        return made
+
+    @property
+    def driver(self):
+        return Alone("novice", self.act, lambda seen: [self.act(each) for each in seen])
+
+    def act(self, features):
+        return 1.0, 0.0
+
+    def test_each_drives_until_its_own_end_and_only_who_drives_is_asked(self):
+        asked = []
+
+        def together(seen):
+            asked.append(len(seen))
+            return [(1.0, 0.0)] * len(seen)
+
+        rides = self.rides()
+        abreast([ride for ride, _ in rides], Alone("novice", self.act, together))
+        assert [ride.record().duration_s for ride, _ in rides] == pytest.approx([1.0, 3.0, 2.0], abs=0.21)
+        assert asked == sorted(asked, reverse=True)
+        assert (asked[0], asked[-1]) == (3, 1)
+
+    @pytest.mark.parametrize("phase", [Phase.UNSEEN, Phase.PROVE])
+    def test_what_comes_of_it_is_what_comes_of_one_after_the_other(self, phase):
+        together, alone = self.rides(phase, walls=(0.5,)), self.rides(phase, walls=(0.5,))
+        abreast([ride for ride, _ in together], self.driver)
+        for ride, _ in alone:
+            while ride.goes_on:
+                ride.step()
+            ride.end()
+        for (one, _), (other, _) in zip(together, alone, strict=True):
+            assert one.tally == other.tally
+            assert one.tally.collisions == 1
+        assert [len(records) for _, records in together] == [len(records) for _, records in alone]
+
+    def test_one_that_sees_nothing_waits_while_the_others_drive(self):
+        rides = self.rides()
+        blind = rides[1][0]._place.arena
+        blind.blind = True
+        with pytest.raises(DeviceError, match="could not be used"):
+            abreast([ride for ride, _ in rides], self.driver)
+        assert not rides[0][0].goes_on
+        assert not rides[2][0].goes_on

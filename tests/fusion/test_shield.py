@@ -144,6 +144,13 @@ class TestShielded:
         assert method.policy("shield")(BOX) == method.policy("novice")(BOX) == box.command
         assert method.policy("novice")(FREE) == (1.0, 0.0)
 
+    def test_several_robots_are_shielded_each_by_what_it_sees(self):
+        together = Alone("novice", lambda _: (1.0, 0.0), lambda seen: [(1.0, 0.0)] * len(seen))
+        method, views = Shielded(together, Shield(SIM)), [FREE, BOX, WALL]
+        assert method.drives_several
+        assert [each.choice for each in method.propose_all(views)] == [method.propose(each).choice for each in views]
+        assert not Shielded(Alone("novice", lambda _: (1.0, 0.0)), Shield(SIM)).drives_several
+
     def test_where_no_turn_is_clear_it_stands_and_calls(self):
         proposal = Shielded(Alone("novice", lambda _: (1.0, 0.0)), Shield(SIM)).propose(WALL)
         assert (proposal.command, proposal.choice.call) == (STAND, Call.FEEDBACK)

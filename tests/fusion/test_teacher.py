@@ -1,5 +1,6 @@
 """The scripted teacher: when it takes control and lets go, in a made-up future, and that nothing is hit in a twin."""
 
+import math
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -67,7 +68,7 @@ class Straight(Crystal):
 
     def rollout(self, state, policy, steps, period_s, ends, first=None):
         self.asked.append((state.x_m, steps, first is not None))
-        return [replace(state, x_m=state.x_m + period_s * k) for k in range(1, steps + 1)]
+        return [replace(state, x_m=state.x_m + period_s * k, linear_m_s=1.0) for k in range(1, steps + 1)]
 
 
 @pytest.fixture
@@ -107,6 +108,43 @@ def test_a_robot_that_is_not_where_it_was_foreseen_is_looked_at_anew(change):
     hand.act(at(0), QUIET, straight)
     hand.act(replace(at(0), **{"x_m": 0.2} | change), QUIET, straight)
     assert [steps for _, steps, _ in future.asked] == [8, 8]
+
+
+class TestSlowedDown:
+    """A robot that calls for feedback drives slowly the way that was foreseen."""
+
+    def asked(self, *drives, policy=straight):
+        future = Straight()
+        hand = teacher(future)
+        hand.act(at(0), CALLED, straight)
+        for step, (x_m, linear_m_s) in enumerate(drives, start=1):
+            hand.act(replace(at(step), x_m=x_m, linear_m_s=linear_m_s), CALLED, policy)
+        return [x_m for x_m, _, _ in future.asked]
+
+    def test_it_is_looked_at_anew_where_it_would_have_decided_anew(self):
+        assert self.asked((0.06, 0.3), (0.12, 0.3), (0.18, 0.3), (0.24, 0.3), (0.30, 0.3)) == [0.0, 0.24]
+
+    def test_one_that_is_as_fast_as_was_foreseen_is_looked_at_wherever_else_it_is(self):
+        assert self.asked((0.1, 1.0)) == [0.0, 0.1]
+
+    def test_another_policy_is_looked_at_at_once(self):
+        assert self.asked((0.06, 0.3), policy=lambda _: (1.0, 0.0)) == [0.0, 0.06]
+
+    def test_what_a_hand_does_was_not_foreseen(self):
+        future = Straight()
+        hand = teacher(future, delay_s=0.0, stray_m=-1.0, free_m=0.0)  # everything is a danger
+        assert hand.act(at(0), QUIET, straight) is not None
+        hand.act(replace(at(1), x_m=0.06, linear_m_s=0.3), QUIET, straight)
+        assert [x_m for x_m, _, _ in future.asked] == [0.0, 0.06]
+
+    def test_a_danger_that_was_foreseen_lasts_until_it_is_looked_at_anew(self, crystal):
+        hand = teacher(crystal, called_delay_s=0.3)
+        crystal.danger = True
+        assert hand.act(at(0), CALLED, straight) is None
+        crystal.danger = False
+        assert hand.act(replace(at(1), x_m=0.06, linear_m_s=0.3), CALLED, straight) is None
+        assert hand.act(replace(at(2), x_m=0.12, linear_m_s=0.3), CALLED, straight) is not None
+        assert crystal.rollouts == 1
 
 
 def test_another_policy_and_one_that_has_learned_are_looked_at_anew():
@@ -161,6 +199,32 @@ def test_a_human_reacts_after_a_while_and_sooner_when_called(crystal):
 
 def test_a_danger_that_passes_before_the_hand_moves_is_left_alone(crystal):
     assert drive(teacher(crystal, delay_s=0.6), crystal, "xx.xx.xxxx") == "---------H"
+
+
+class Late(Straight):
+    """A foresight in which who goes straight on collides beyond `end_m`, who turns never, and who is slow at once."""
+
+    def __init__(self, end_m):
+        super().__init__()
+        self.end_m = end_m
+
+    def rollout(self, state, policy, steps, period_s, ends, first=None):
+        linear, angular = self.does = first or self.does
+        drive = super().rollout(state, policy, steps, period_s, ends, first)
+        end_m = 0.0 if linear < 1.0 else self.end_m if angular == 0.0 else math.inf
+        return [replace(each, collided=each.x_m > end_m) for each in drive]
+
+
+@pytest.mark.parametrize(("end_m", "given"), [(1.0, "lidar"), (2.8, "lidar"), (4.0, "camera")])
+def test_control_is_given_to_the_first_expert_that_does_well_for_two_horizons(end_m, given):
+    experts = {"camera": straight, "lidar": lambda _: (1.0, 0.1)}
+    only = {"camera": straight}
+    answers = [
+        ScriptedTeacher(Late(end_m), PROFILE, PERFECT, 0).act(at(0), QUIET, lambda _: (0.9, 0.0), offers)
+        for offers in (experts, only)
+    ]
+    assert answers[0] == given
+    assert (answers[1] == "camera") == (given == "camera")  # else it drives itself
 
 
 def test_a_missed_danger_is_seen_late_and_so_a_robot_that_stands_and_asks_does_not_stand_for_ever(crystal):

@@ -15,7 +15,7 @@ from lira.fusion.log.recorder import Journal
 from lira.fusion.log.run_log import LapRecord, ResultRecord, RunWriter, StepRecord
 from lira.fusion.methods.base import Alone, Method
 from lira.fusion.methods.presets import METHODS
-from lira.fusion.teaching.session import Tally
+from lira.fusion.teaching.ride import Tally
 from lira.fusion.teaching.teacher import SKILLED
 from lira.hal.errors import ConfigError
 from lira.hal.messages import (

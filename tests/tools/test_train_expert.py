@@ -7,7 +7,7 @@ import torch
 
 from lira.fusion.inference.checkpoint import load_checkpoint
 from lira.fusion.teaching.curriculum import CURRICULA, STRICT, Curriculum
-from lira.fusion.teaching.session import Drive
+from lira.fusion.teaching.ride import Drive
 from lira.hal.messages import Episode
 from lira.tools import cli
 

@@ -95,7 +95,7 @@ def watched(meter: Meter) -> Iterator[None]:
             (PinholeCamera, "render", "render"),
             (RayLidar, "scan", "rays"),
             (ScriptedTeacher, "act", "teacher"),
-            *((kind, "propose", "inference") for kind in methods()),
+            *((kind, name, "inference") for kind in methods() for name in ("propose", "propose_all")),
             *((kind, name, "training") for kind in methods() for name in ("update", "learn")),
         ):
             if name in vars(owner):

@@ -7,7 +7,7 @@ shield, with somebody to ask.
 
 import math
 from collections.abc import Callable, Sequence
-from contextlib import AbstractContextManager, nullcontext
+from contextlib import AbstractContextManager
 from typing import Literal
 
 import msgspec
@@ -19,12 +19,14 @@ from lira.fusion.log.run_log import LapRecord, Pose, Record, ResultRecord, StepR
 from lira.fusion.methods.base import Method
 from lira.fusion.methods.shield import Shield, Shielded
 from lira.fusion.methods.stop_and_ask import Doubtful
+from lira.fusion.teaching.ride import Drive
 from lira.fusion.teaching.session import Session
 from lira.hal.messages import Phase
 from lira.hal.profile import Field, RobotProfile, load_profile
 from lira.sim_backend.foresight import with_small_camera
 from lira.sim_backend.shifts import shifted
 from lira.sim_backend.world import World
+from lira.tools.experiments.fleet import Fleet, fleet
 from lira.tools.runs.course import Course, lap
 from lira.tools.runs.simulated import SimulatedRobot, simulate
 
@@ -105,6 +107,23 @@ class Tape:
             self._last = None
 
 
+def shown(
+    robots: Fleet,
+    driver: Method,
+    drives: Sequence[Drive],
+    phase: Phase,
+    lap: int,
+    journal: Journal,
+    apprentice: Method | None = None,
+) -> tuple[list[LapRecord], float]:
+    """Let a novice drive some layouts abreast; returns what came of each, and how far they drove in all."""
+    tapes = [Tape() for _ in drives]
+    records = robots.drive(driver, drives, phase, lap, [journal.aside(tape.write) for tape in tapes], apprentice)
+    for record in records:
+        journal.write(record)
+    return records, math.fsum(tape.driven_m for tape in tapes)
+
+
 Judge = Callable[[tuple[float, ...]], Sequence[Judged]]
 Hand = Callable[[RobotProfile, World], AbstractContextManager[Teacher]]
 """Opens somebody who answers."""
@@ -116,11 +135,11 @@ def teach_to(
     method: Method,
     hand: Teacher,
     journal: Journal,
-    tape: Tape,
     course: Course,
     judge: Judge,
+    robots: Fleet,
 ) -> tuple[ResultRecord, list[Point], list[Judged]]:
-    """Teach for at most the course's laps; `tape` hears what `journal` writes, `judge` tries who reached a level."""
+    """Teach for at most the course's laps; `judge` tries who reached a level, `robots` show how good the novice is."""
     loop = ControlLoop(robot, truth=robot.arena.state)
     session = Session(robot, robot.arena, loop, journal, method, method.alone)
     loop.arm()
@@ -129,7 +148,7 @@ def teach_to(
     waiting, more = list(quality.levels), quality.more
     for number in range(1, course.laps + quality.more + 1):
         session.train(course, hand, number)
-        points.append(_point(quality, session, method, journal, tape, course, number))
+        points.append(_point(quality, method, journal, course, number, robots))
         new = tuple(level for level in waiting if points[-1].reaches(level, quality.layouts))
         if new:
             waiting = [level for level in waiting if level not in new]
@@ -145,17 +164,16 @@ def teach_to(
     return session.result(not waiting, course.syllabus.proof), points, judged
 
 
-def _point(
-    quality: Quality, session: Session, method: Method, journal: Journal, tape: Tape, course: Course, number: int
-) -> Point:
-    ledger, before_m = journal.ledger, tape.driven_m
-    shown: list[LapRecord] = []
+def _point(quality: Quality, method: Method, journal: Journal, course: Course, number: int, robots: Fleet) -> Point:
+    ledger = journal.ledger
+    laps, driven_m = list[LapRecord](), 0.0
     if method.novice.trained:
-        runs = course.proven(number)
-        half = len(runs) // 2
-        shown = session.score(runs[:half], number)
-        if sum(each.passed for each in shown) + len(runs) - half >= least(quality.levels[0], len(runs)):
-            shown += session.score(runs[half:], number)
+        drives = [drive for run in course.proven(number) for drive in run]
+        driver, half = method.alone(Phase.PROVE), len(drives) // 2
+        laps, driven_m = shown(robots, driver, drives[:half], Phase.PROVE, number, journal, method)
+        if sum(each.passed for each in laps) + len(drives) - half >= least(quality.levels[0], len(drives)):
+            more, more_m = shown(robots, driver, drives[half:], Phase.PROVE, number, journal, method)
+            laps, driven_m = laps + more, driven_m + more_m
     return Point(
         lap=number,
         human_labels=ledger.labels.stored_human,
@@ -163,10 +181,10 @@ def _point(
         interventions=ledger.interventions,
         calls=ledger.calls,
         human_s=ledger.account.human_steps * course.profile.period_s,
-        layouts=len(shown),
-        passed=sum(each.passed for each in shown),
-        collisions=sum(each.collisions for each in shown),
-        driven_m=round(tape.driven_m - before_m, 1),
+        layouts=len(laps),
+        passed=sum(each.passed for each in laps),
+        collisions=sum(each.collisions for each in laps),
+        driven_m=round(driven_m, 1),
     )
 
 
@@ -202,17 +220,12 @@ def _try(
     """The laps of one way, on a robot of their own."""
     if way == "field":
         profile = msgspec.structs.replace(profile, field=load_profile(profile.name).field or FIELD)
-    driver = _driver(method, way, profile)
-    asks = way == "ask" or method.calls_alone
-    tape = Tape()
-    with (
-        simulate(world, profile, layout=layouts[0], renderer="sketch") as robot,
-        hand(profile, world) if asks else nullcontext() as answering,
-    ):
-        loop = ControlLoop(robot, truth=robot.arena.state)
-        session = Session(robot, robot.arena, loop, Journal(write=tape.write), None, lambda _: driver)
-        loop.arm()
-        laps = session.show([lap(profile, world, layout) for layout in layouts], answering)
+    driver, drives = _driver(method, way, profile), [lap(profile, world, layout) for layout in layouts]
+    if way == "ask" or method.calls_alone:
+        laps, driven_m = _answered(driver, profile, world, drives, hand)
+    else:
+        with fleet(world, profile, len(drives)) as robots:
+            laps, driven_m = shown(robots, driver, drives, Phase.UNSEEN, 1, Journal())
     return Judged(
         levels,
         way,
@@ -221,8 +234,23 @@ def _try(
         collisions=sum(each.collisions for each in laps),
         lost=sum(each.lost for each in laps),
         stops=sum(each.stops for each in laps),
-        driven_m=round(tape.driven_m, 1),
+        driven_m=round(driven_m, 1),
     )
+
+
+def _answered(
+    driver: Method, profile: RobotProfile, world: World, drives: Sequence[Drive], hand: Hand
+) -> tuple[list[LapRecord], float]:
+    """With somebody who answers it is one robot that drives, lap after lap."""
+    tape = Tape()
+    with (
+        simulate(world, profile, layout=drives[0].episode.layout, renderer="sketch") as robot,
+        hand(profile, world) as answering,
+    ):
+        loop = ControlLoop(robot, truth=robot.arena.state)
+        session = Session(robot, robot.arena, loop, Journal(write=tape.write), None, lambda _: driver)
+        loop.arm()
+        return session.show(drives, answering), tape.driven_m
 
 
 def _driver(method: Method, way: Way, profile: RobotProfile) -> Method:

@@ -22,8 +22,9 @@ from lira.sim_backend.catalogue import load_world
 from lira.sim_backend.foresight import with_small_camera
 from lira.sim_backend.scenes.opening import quickest
 from lira.sim_backend.world import World
+from lira.tools.experiments.fleet import fleet
 from lira.tools.experiments.notes import Notes, Track
-from lira.tools.experiments.quality import Judged, Point, Quality, Tape, judging, teach_to
+from lira.tools.experiments.quality import Judged, Point, Quality, judging, teach_to
 from lira.tools.runs.build import build_method, teacher
 from lira.tools.runs.course import Course, run_course
 from lira.tools.runs.simulated import SimulatedRobot, simulate
@@ -129,10 +130,9 @@ def _to_quality(
     layouts: Sequence[int],
 ) -> Outcome:
     """Teach until the novice is as good as is wanted; of the laps only the numbers are kept."""
-    tape, laps = Tape(), list[LapRecord]()
+    laps: list[LapRecord] = []
 
     def write(record: Record) -> None:
-        tape.write(record)
         if isinstance(record, LapRecord):
             laps.append(record)
 
@@ -140,5 +140,6 @@ def _to_quality(
         return closing(teacher(trial.skill, profile, world, layouts[0], trial.seed))
 
     judge = judging(quality, method, course.profile, course.world, layouts, answering)
-    result, points, judged = teach_to(quality, robot, method, hand, Journal(write=write), tape, course, judge)
+    with fleet(course.world, with_small_camera(course.profile), quality.layouts) as robots:
+        result, points, judged = teach_to(quality, robot, method, hand, Journal(write=write), course, judge, robots)
     return Outcome(trial, tuple(laps), result, {}, (), points=tuple(points), judged=tuple(judged))

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 from lira.fusion.log.counts import Ledger
 from lira.fusion.log.run_log import LapRecord
-from lira.fusion.teaching.session import Tally
+from lira.fusion.teaching.ride import Tally
 from lira.hal.messages import SessionState, Stage
 from lira.tools.live.before import Before
 from lira.tools.runs.progress import Say

@@ -14,7 +14,8 @@ from lira.fusion.control import ControlLoop
 from lira.fusion.log.recorder import Journal
 from lira.fusion.log.run_log import LapRecord, Record
 from lira.fusion.methods.base import Method
-from lira.fusion.teaching.session import Drive, Session
+from lira.fusion.teaching.ride import Drive
+from lira.fusion.teaching.session import Session
 from lira.hal.messages import Phase
 from lira.hal.profile import RobotProfile
 from lira.sim_backend.scenes.opening import quickest

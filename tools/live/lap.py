@@ -5,7 +5,7 @@ from enum import Enum
 import numpy as np
 
 from lira.fusion.control import Step
-from lira.fusion.teaching.session import BLIND_M, Tally
+from lira.fusion.teaching.ride import BLIND_M, Tally
 from lira.hal.messages import Call, CourseState, Driver, Phase
 
 

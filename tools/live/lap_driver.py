@@ -8,7 +8,7 @@ from lira.fusion.log.recorder import Journal
 from lira.fusion.log.run_log import LapRecord
 from lira.fusion.methods.base import Method
 from lira.fusion.operator_service import OperatorService
-from lira.fusion.teaching.session import Drive, Tally, after_crash, lap_record
+from lira.fusion.teaching.ride import Drive, Tally, after_crash, lap_record
 from lira.hal.messages import Applied, CourseState, Driver, Episode, Phase, Reason, Request, Stage
 from lira.hal.port import Arena, Robot
 from lira.tools.live.board import Board

@@ -12,7 +12,7 @@ from lira.fusion.inference.architecture import FUSION, KERNEL
 from lira.fusion.inference.kernel_net import KernelNet
 from lira.fusion.inference.networks import DrivingNet
 from lira.fusion.learning.kernel_novice import KernelNovice
-from lira.fusion.learning.novice import Novice, Trainer
+from lira.fusion.learning.novice import Novice, Trainer, used_turn
 from lira.fusion.methods.base import Expert, Method, Policy
 from lira.fusion.methods.context import Context, Trunks
 from lira.fusion.methods.presets import Preset
@@ -56,6 +56,7 @@ def build_method(
         learning = preset.learning if m is None else msgspec.structs.replace(preset.learning, labels_per_step=m)
         novice: Novice
         if preset.kernel is not None:
+            learning = msgspec.structs.replace(learning, turn=used_turn(profile.base))
             novice = KernelNovice(KernelNet.from_experts(sees), learning, preset.kernel, mirrored=preset.mirrored)
         else:
             from lira.tools.runs.network_novice import network_novice  # torch, which a regression does without

@@ -10,7 +10,8 @@ from lira.fusion.log.run_log import ResultRecord
 from lira.fusion.methods.base import Method
 from lira.fusion.methods.shield import Shield, Shielded
 from lira.fusion.methods.syllabus import THESIS, Syllabus
-from lira.fusion.teaching.session import Drive, Session
+from lira.fusion.teaching.ride import Drive
+from lira.fusion.teaching.session import Session
 from lira.hal.messages import Episode, Phase
 from lira.hal.port import Arena, Robot
 from lira.hal.profile import RobotProfile
