@@ -68,7 +68,7 @@ class Journal:
     def note(self, step: Step, *, phase: Phase, lap: int, layout: int, training_steps: int) -> None:
         """Record one step."""
         choice, features = step.lesson.choice, step.proposal.features
-        self._keep_labels(step, lap)
+        settled = self._keep_labels(step, lap)
         if phase == Phase.TRAIN:
             demonstrating = step.proposal.choice.driver == Driver.NOBODY
             self.ledger.note(step.lesson, now_s=step.observation.stamp_s, demonstrating=demonstrating)
@@ -84,11 +84,12 @@ class Journal:
                 label=choice.driver if step.lesson.stored else None,
                 image=MODALITIES["image"].keep(features.image).tobytes() if risen and "image" in features else None,
                 elapsed_s=self.elapsed_s,
+                settled=tuple((label.source, label.action) for label in settled if label.stored),
             )
         )
 
-    def _keep_labels(self, step: Step, lap: int) -> None:
-        """Hand on the step's label, and those of earlier steps on which it was decided now."""
+    def _keep_labels(self, step: Step, lap: int) -> list[Demonstration]:
+        """Hand on the step's label, and those of earlier steps on which it was decided now, which are returned."""
         choice, features = step.lesson.choice, step.proposal.features
         if choice.label is not None:
             label = Demonstration(
@@ -105,9 +106,12 @@ class Journal:
                 self._reserved[id(step.proposal)] = step.proposal, label
             else:
                 self._hand_on(label)
+        decided = []
         for settled in step.lesson.settled:
             _, label = self._reserved.pop(id(settled.proposal))
-            self._hand_on(replace(label, stored=settled.stored))
+            decided.append(replace(label, stored=settled.stored))
+            self._hand_on(decided[-1])
+        return decided
 
     def _hand_on(self, label: Demonstration) -> None:
         self._keep(label)

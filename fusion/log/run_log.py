@@ -59,7 +59,8 @@ class Pose(msgspec.Struct, frozen=True):
 class StepRecord(msgspec.Struct, frozen=True, tag="step"):
     """One decision, where the robot really was, and what was learned from it.
 
-    `label` names who gave a label that was stored at this step, else None.
+    `label` names who gave a label that was stored at this step, else None. `settled` are those of earlier steps that
+    were stored now, when that was decided: who gave each, and its action.
     `image` is what the camera showed when a call rose: uint8 [px, px] row by row, else None.
     """
 
@@ -69,6 +70,7 @@ class StepRecord(msgspec.Struct, frozen=True, tag="step"):
     label: str | None = None
     image: bytes | None = None
     elapsed_s: float = 0.0  # wall-clock time since the run began
+    settled: tuple[tuple[str, Action], ...] = ()
 
 
 class LapRecord(msgspec.Struct, frozen=True, tag="lap"):

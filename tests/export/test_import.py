@@ -79,7 +79,7 @@ def test_only_what_a_person_drove_is_taken_unless_more_is_asked_for(data_set):
 
 def test_import_makes_labels_that_a_run_begins_with(data_set, tmp_path, capsys):
     assert main(["import", str(data_set), "--run", str(tmp_path), "--frames", "all"]) == 0
-    assert "9 demonstrations" in capsys.readouterr().out
+    assert "9 labels (human 2, camera 1, novice 6) are in" in capsys.readouterr().out
     labels = list(read_demonstrations(tmp_path / "labels.lira"))
     assert len(labels) == 9
     assert all(label.stored for label in labels)
@@ -170,7 +170,7 @@ def test_pictures_among_the_numbers_are_as_good_as_a_video(data_set, tmp_path):
 def test_what_a_robot_cannot_do_is_cut_and_counted(tmp_path):
     shown = [Shown(1.0, 0, features(0), (2.0, 0.1)), Shown(2.0, 0, features(1), (0.5, 0.1))]
     tally = keep(shown, tmp_path / "labels.lira", PROFILE)
-    assert (tally.taken, tally.clipped) == (2, 1)
+    assert (tally.taken, tally.clipped) == ({"human": 2}, 1)
     assert [label.action for label in read_demonstrations(tmp_path / "labels.lira")] == [(1.0, 0.1), (0.5, 0.1)]
     with pytest.raises(StorageError, match="nothing to learn from"):
         keep([], tmp_path / "others.lira", PROFILE)
@@ -181,7 +181,7 @@ def test_what_cannot_be_a_label_is_told_or_left_out(tmp_path):
     nothing = Shown(1.0, 0, features(0), (float("nan"), 0.1))
     others = [Shown(2.0, 0, features(1), (0.5, 0.1), name) for name in ("lab/wall:go", "o" * 99, " ", "a\n")]
     tally = keep([nothing, *others], tmp_path / "labels.lira", PROFILE)
-    assert (tally.taken, tally.without) == (4, 1)
+    assert (tally.taken.total(), tally.without) == (4, 1)
     names = [label.source for label in read_demonstrations(tmp_path / "labels.lira")]
     assert names == ["lab/wall:go", "human", "human", "human"]
     metres = Features(image=features(0).image, scan=features(0).scan * 4)
@@ -311,5 +311,5 @@ def test_what_is_no_bag_is_told(tmp_path, capsys):
 def test_a_bag_becomes_labels(tmp_path, capsys):
     folder = bag(tmp_path / "bag", drive())
     assert main(["import", str(folder), "--run", str(tmp_path / "run")]) == 0
-    assert "5 demonstrations" in capsys.readouterr().out
+    assert "5 labels (human 5) are in" in capsys.readouterr().out
     assert len(list(read_demonstrations(tmp_path / "run/labels.lira"))) == 5

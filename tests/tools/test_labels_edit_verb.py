@@ -125,7 +125,7 @@ def test_what_became_of_a_label_is_told_alike_by_list_and_explain_whatever_was_u
 def test_two_logs_become_one(folder, capsys, tmp_path):
     status, said = lira(capsys, "merge", folder / LABELS, folder / LABELS, "-o", tmp_path / "both.lira")
     assert status == 0
-    assert "10 labels; 10 of them are in both, and kept once" in said.out
+    assert "10 labels given; 10 of them are in both, and kept once" in said.out
 
 
 @pytest.mark.parametrize(

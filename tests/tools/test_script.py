@@ -74,5 +74,5 @@ def test_a_novice_without_a_network_leaves_its_labels(tmp_path):
     head = Plan(method_named("hold")).head(PROFILE, "lane")
     assert "there is no novice yet" in snapshot(tmp_path, novice, PROFILE, head)()
     novice.stored, novice.training_steps = 3, 1
-    assert "saved 3 labels" in snapshot(tmp_path, novice, PROFILE, head)()
+    assert "saved 3 labels learned" in snapshot(tmp_path, novice, PROFILE, head)()
     assert list(tmp_path.iterdir()) == []

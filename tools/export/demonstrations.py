@@ -1,8 +1,9 @@
 """What somebody showed elsewhere, as labels for a learner here: a log that a run goes on from."""
 
 import math
+from collections import Counter
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from itertools import chain
 from pathlib import Path
 
@@ -30,9 +31,9 @@ class Shown:
 
 @dataclass(slots=True)
 class Tally:
-    """How many were taken, of how many the action was cut to what the robot can do, and how many had none."""
+    """How many were taken by source, of how many the action was cut to what the robot can do, how many had none."""
 
-    taken: int = 0
+    taken: Counter[str] = field(default_factory=Counter)
     clipped: int = 0
     without: int = 0
 
@@ -52,8 +53,9 @@ def keep(shown: Iterable[Shown], path: Path, profile: RobotProfile, say: Callabl
         raise StorageError("there is nothing to learn from in it", "Is it the right file, and were all sensors there?")
     with DemonstrationLog(path, profile, say=say) as log:
         for number, each in enumerate(chain([first], usable)):
-            log.append(_label(number, each))
-            tally.taken += 1
+            label = _label(number, each)
+            log.append(label)
+            tally.taken[label.source] += 1
             tally.clipped += _within(each.action) != each.action
     return tally
 

@@ -75,7 +75,7 @@ def sit(args: argparse.Namespace, plan: Plan, robot: RemoteRobot, rules: Rules, 
         )
         loop.arm()
         if room.before.newest is not None:
-            say(f"goes on with {room.method.novice.stored} labels from before")
+            say(f"goes on with {room.method.novice.stored} labels learned before")
         session.run()
         aside = in_the_log(folder / LABELS, room.method.novice.set_aside())
         record.write(msgspec.structs.replace(session.result(), contradictions=tuple(aside)))

@@ -76,11 +76,12 @@ class Run:
         return ((lap, step) for lap in self.laps for step in lap.steps)
 
     def labels(self) -> dict[str, list[Action]]:
-        """Actions of the stored labels by source: "human" and "expert" (one expert's, or the mean of several)."""
+        """Actions of the learned labels by source: "human" and "expert" (one expert's, or the mean of several)."""
         actions: dict[str, list[Action]] = {"human": [], "expert": []}
         for _, step in self.steps():
-            if step.label is not None:
-                actions["human" if step.label == Driver.HUMAN else "expert"].append(step.decision.executed)
+            own = [] if step.label is None else [(step.label, step.decision.executed)]
+            for source, action in (*own, *step.settled):
+                actions["human" if source == Driver.HUMAN else "expert"].append(action)
         return actions
 
 

@@ -4,7 +4,7 @@ from lira.tools.report.digest import Lap
 
 COLUMNS = (
     *("lap", "layout", "passed", "without human", "time", "collisions", "line lost", "off line, rms"),
-    *("human labels", "interventions", "calls", "buffer", "training steps"),
+    *("human labels", "interventions", "calls", "labels learned", "training steps"),
 )
 
 

@@ -90,10 +90,10 @@ def figures(run: Run) -> Iterable[tuple[str, str]]:
     if run.result:
         result = run.result
         yield "human labels", str(result.human_labels)
+        yield "labels learned", str(result.buffer)
         yield "demonstration", f"{result.demonstration} labels"
         yield "interventions", str(result.interventions)
         yield "calls", str(result.calls)
-        yield "buffer", str(result.buffer)
         yield "training steps", str(result.training_steps)
         yield "simulated time", clock(result.simulated_s)
         if result.elapsed_s > 0:
@@ -125,7 +125,7 @@ def lap_table(run: Run) -> str:
     rows = "".join(
         "<tr>" + "".join(f"<td>{escape(cell)}</td>" for cell in lap_cells(lap)) + "</tr>" for lap in run.laps
     )
-    note = "Labels, interventions, calls, buffer and training steps are totals since the run began."
+    note = "Labels, interventions, calls and training steps are totals since the run began."
     return section("Laps", note, f'<div class="scroll"><table><tr>{header}</tr>{rows}</table></div>')
 
 
@@ -228,7 +228,7 @@ def densities(run: Run) -> str:
     )
     linear = plots.density(labels, 0, "Linear velocity", ("-1: full speed back", "1: full speed ahead"))
     angular = plots.density(labels, 1, "Angular velocity", ("-1: full right", "1: full left"))
-    note = "Labels in the buffer by action, as a share of the robot's limits, and by who gave them (thesis, fig. E.4)."
+    note = "Labels learned, by action, as a share of the robot's limits, and by who gave them (thesis, fig. E.4)."
     body = f'<div class="legend">{colours}</div><div class="pair">{linear}{angular}</div>'
     return section("What it learned from", note, body)
 

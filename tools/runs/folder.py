@@ -40,16 +40,15 @@ def snapshot(
     def write() -> str:
         sync()
         if steps == 0:
-            return f"saved {labels} labels in {folder}; there is no novice yet"
+            return f"saved {labels} labels learned in {folder}; there is no novice yet"
         if network is None:
-            return f"saved {labels} labels in {folder}; this method's novice has no network to save"
+            return f"saved {labels} labels learned in {folder}; this method's novice has no network to save"
         about = Checkpoint.of(network, profile.name, head.command, head.seed)
         about = replace(about, labels=labels, training_steps=steps)
         save_checkpoint(folder / NOVICE, network, about)
         doubtful = contradiction_words(in_the_log(folder / LABELS, aside))
-        return "\n".join(
-            filter(None, [f"saved {labels} labels and the novice after {steps} training steps in {folder}", doubtful])
-        )
+        saved = f"saved {labels} labels learned, and the novice after {steps} training steps, in {folder}"
+        return "\n".join(filter(None, [saved, doubtful]))
 
     return write
 

@@ -13,6 +13,7 @@ from lira.fusion.log.run_log import LapRecord, Record, ResultRecord, RunRecord, 
 from lira.hal.config import MALFORMED
 from lira.hal.errors import StorageError
 from lira.hal.messages import Call, Decision, MethodCalls, Phase
+from lira.tools.output.label_words import so_far_words
 from lira.tools.output.lap_names import lap_name
 from lira.tools.output.proven import proof_words
 
@@ -83,14 +84,11 @@ class Progress:
         if self._newest is None or self._first is None:
             return ""
         decision = self._newest.decision
-        labels = decision.labels
         name = lap_name(decision.phase, decision.lap, self._newest.layout, self._turn(decision.lap))
         words = [name, f"{decision.driver} drives"]
         if decision.call != Call.NONE:
             words.append(f"{decision.call} call")
-        words.append(
-            f"labels {labels.demonstration} shown first, {labels.stored_human} human, {labels.stored_expert} expert"
-        )
+        words.append(so_far_words(decision.labels))
         words.append(f"{decision.interventions} interventions, {decision.calls} calls")
         elapsed_s = self._newest.elapsed_s - self._first.elapsed_s
         if elapsed_s > 1.0:
@@ -112,7 +110,7 @@ def lap_line(lap: LapRecord, turn: int = 1) -> str:
         words += f", turns changed by the shield {lap.shielded}"
     if lap.phase == Phase.TRAIN:
         words += f"  human labels {lap.human_labels}, interventions {lap.interventions}, calls {lap.calls},"
-        words += f" buffer {lap.buffer}, training steps {lap.training_steps}"
+        words += f" labels learned {lap.buffer}, training steps {lap.training_steps}"
     return words
 
 

@@ -77,7 +77,8 @@ def list_labels(args: argparse.Namespace) -> int:
     except LiraError:
         aside = {}  # no novice is there that could tell
     rows = list_rows(labels, aside)
-    return tell(args, {"file": str(path), "labels": rows}, list_table(rows))
+    head = f"{len(labels)} labels given, {sum(label.stored for label in labels)} of them learned"
+    return tell(args, {"file": str(path), "labels": rows}, f"{head}\n\n{list_table(rows)}")
 
 
 def undo(args: argparse.Namespace) -> int:
@@ -141,7 +142,9 @@ def merge(args: argparse.Namespace) -> int:
     one, other = args.file
     count, both = label_edit.merge(one, other, args.output)
     twice = f"; {both} of them are in both, and kept once" if both else ""
-    words = f"{args.output}: {count} labels{twice}\nto go on with them: put it into a folder as labels.lira, then "
+    words = (
+        f"{args.output}: {count} labels given{twice}\nto go on with them: put it into a folder as labels.lira, then "
+    )
     words += "lira fusion --method NAME --run DIR"
     return tell(args, {"file": str(args.output), "labels": count, "in_both": both}, words)
 
@@ -206,7 +209,7 @@ def row(path: Path, found: "Survey", kept: Path | None) -> dict[str, Any]:
 
 def words(path: Path, found: "Survey", kept: Path | None) -> str:
     """What was found, for a person."""
-    lines = [f"{path}: {found.count} labels of '{found.form.profile}' in {found.newest_run + 1} runs"]
+    lines = [f"{path}: {found.count} labels given, of '{found.form.profile}' in {found.newest_run + 1} run(s)"]
     if not found.words():
         lines.append("  nothing is damaged")
     else:

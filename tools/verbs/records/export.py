@@ -55,7 +55,7 @@ def run(args: argparse.Namespace) -> int:
     count = sum(map(len, found.tables))
     kept = sum(int(table["in_buffer"].values.sum()) for table in found.tables)
     by = f"by {found.labels}" if found.labels else "by the recording's counts"
-    print(f"written: {args.out}: {len(found.tables)} episodes, {count} steps; {kept} are in the buffer, {by}")
+    print(f"written: {args.out}: {len(found.tables)} episodes, {count} steps; {kept} of them are labels learned, {by}")
     return 0
 
 

@@ -1,4 +1,4 @@
-"""Take a LeRobot data set or a bag as demonstrations: labels of a run, which a learner starts from.
+"""Take a LeRobot data set or a bag as labels of a run, given by whoever drove there, from which a learner starts.
 
 A data set (v3) needs a picture, an action of two numbers in [-1, 1] (linear, angular), and for a robot with a lidar its
 scan as the networks see it; what `lira export lerobot` wrote has all that. A bag (ROS 1 or 2, MCAP or SQLite) needs a
@@ -25,7 +25,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add("file", type=Path, metavar="FILE", help="folder of a LeRobot data set, or of a bag")
     add("--run", type=Path, required=True, metavar="DIR", help="folder of the run whose labels these become")
     add_profile(parser, "thesis-sim", "robot that is to learn from it,")
-    add("--frames", choices=("all", "interventions", "buffer"), help="which frames of a data set (default: a person's)")
+    add(
+        "--frames",
+        choices=("all", "interventions", "buffer"),
+        help="frames of a data set: all, those in which a person drove "
+        "(default), or those that the learner of a run of ours learned",
+    )
     add("--map", action="append", default=[], type=_pair, metavar="NAME=FEATURE", help="which feature is image or scan")
     for role in ROLES:
         add(f"--{role}", metavar="TOPIC", help=f"which topic of a bag is the {role}")
@@ -42,6 +47,7 @@ def run(args: argparse.Namespace) -> int:
     """Read it, and append what was shown to the run's labels."""
     from lira.hal.profile import load_profile
     from lira.tools.export.demonstrations import keep
+    from lira.tools.output.label_words import by_source
     from lira.tools.runs.names import LABELS
 
     profile, path = load_profile(args.profile), args.run / LABELS
@@ -56,5 +62,5 @@ def run(args: argparse.Namespace) -> int:
     tally = keep(shown, path, profile)
     cut = f"; {tally.clipped} of them were more than the robot can do, and are cut" if tally.clipped else ""
     without = f"; {tally.without} without an action are left out" if tally.without else ""
-    print(f"{tally.taken} demonstrations are in {path}{cut}{without}")
+    print(f"{tally.taken.total()} labels ({by_source(tally.taken)}) are in {path}, to be learned{cut}{without}")
     return 0

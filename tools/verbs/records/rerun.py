@@ -85,7 +85,7 @@ def words(again: "Again", took_s: float) -> list[str]:
     if again.identical:
         assert again.final is not None
         final = again.final
-        what = f"{len(again.proposed)} decisions, {final.labels} labels, {final.steps} training steps"
+        what = f"{len(again.proposed)} decisions, {final.labels} labels learned, {final.steps} training steps"
         what += f", novice {final.weights[:12]}" if final.weights else ""
         return [f"identical: {what} by '{name}'; {trace.seconds:.0f} s in {took_s:.1f} s"]
     lines = [f"'{name}' does not do the same:"]

@@ -186,6 +186,7 @@ def raise_dead(parts: Sequence["ChildProcess"]) -> None:
 
 def conclude(folder: Path) -> int:
     """Print the table, write the report, and return 0 if the novice was proven and passed every unseen layout."""
+    from lira.tools.output.label_words import learned_words
     from lira.tools.output.proven import contradiction_words, proof_words, unseen_words
     from lira.tools.output.table import format_table
     from lira.tools.report import RECORD, write_report
@@ -198,7 +199,7 @@ def conclude(folder: Path) -> int:
     proven = run.result is not None and run.result.converged
     said = [unseen_words(unseen)]
     if run.result is not None:
-        said += [proof_words(run.result), contradiction_words(run.result.contradictions)]
+        said += [learned_words(run.result), proof_words(run.result), contradiction_words(run.result.contradictions)]
     for words in filter(None, said):
         print(words)
     print(f"report: {write_report(folder)}")

@@ -179,6 +179,7 @@ def script_of(args: argparse.Namespace) -> Iterator[None]:
 
 def conclude(folder: Path, passed: bool | None, shown_as: str) -> int:
     """Write the report, and say where it is and what to do with it."""
+    from lira.tools.output.label_words import learned_words
     from lira.tools.output.table import format_table
     from lira.tools.report import RECORD, write_report
     from lira.tools.report.digest import load_run
@@ -186,6 +187,8 @@ def conclude(folder: Path, passed: bool | None, shown_as: str) -> int:
 
     recorded = load_run(folder / RECORD)
     print(f"\n{format_table(COLUMNS, [lap_cells(lap) for lap in recorded.laps])}\n")
+    if recorded.result is not None:
+        print(learned_words(recorded.result))
     if recorded.verdict is not None:
         print(f"{recorded.verdict.words}.")
     print(f"report: {write_report(folder, shown_as)}")
