@@ -157,14 +157,10 @@ class ScriptedTeacher:
             return None
         if self._random.random() < self._settings.wrong_direction:
             return list(offers)[int(self._random.integers(len(offers)))]
-        return next((name for name, policy in offers.items() if self._trusts(policy, state, seen)), None)
-
-    def _trusts(self, policy: Policy, state: CourseState, seen: Features) -> bool:
-        """Whether a policy does well for two horizons: what goes wrong in the second would be taken from it at once."""
-        near = self._foresee(state, seen, policy, self._steps)
-        if self._goes_wrong(state, near):
-            return False
-        return not self._goes_wrong(near[-1], self._foresee(near[-1], None, policy, self._steps))
+        for name, policy in offers.items():
+            if not self._goes_wrong(state, self._foresee(state, seen, policy, self._steps)):
+                return name
+        return None
 
     def _danger(self, state: CourseState, proposal: Proposal, policy: Policy) -> bool:
         """Whether the policy goes wrong; it does not where no policy could."""

@@ -209,14 +209,14 @@ class Late(Straight):
         self.end_m = end_m
 
     def rollout(self, state, policy, steps, period_s, ends, first=None):
-        linear, angular = self.does = first or self.does
+        linear, angular = first
         drive = super().rollout(state, policy, steps, period_s, ends, first)
         end_m = 0.0 if linear < 1.0 else self.end_m if angular == 0.0 else math.inf
         return [replace(each, collided=each.x_m > end_m) for each in drive]
 
 
-@pytest.mark.parametrize(("end_m", "given"), [(1.0, "lidar"), (2.8, "lidar"), (4.0, "camera")])
-def test_control_is_given_to_the_first_expert_that_does_well_for_two_horizons(end_m, given):
+@pytest.mark.parametrize(("end_m", "given"), [(1.0, "lidar"), (4.0, "camera")])
+def test_control_is_given_to_the_first_expert_that_does_well(end_m, given):
     experts = {"camera": straight, "lidar": lambda _: (1.0, 0.1)}
     only = {"camera": straight}
     answers = [
