@@ -158,10 +158,9 @@ def test_missing_experts_are_named_before_anything_starts(tmp_path):
     [([], "fresh:3"), (["--world", "corridor"], "fresh:6"), (["--world", "corridor", "--proof", "own"], "own")],
 )
 def test_a_world_is_proven_as_its_task_says_unless_somebody_asks_for_something_else(words, proof, monkeypatch):
-    started = {}
-    monkeypatch.setattr(
-        demo, "supervise", lambda parts, fusion, folder: started.update(parts=parts, fusion=fusion) or 0
-    )
+    started = []
+    monkeypatch.setattr(demo, "supervise", lambda *words: started.extend(words) or 0)
     assert main(["demo", *words, "--randomise"]) == 0
-    assert started["fusion"][started["fusion"].index("--proof") + 1] == proof
-    assert "--randomise" in started["parts"][0].command("")
+    parts, fusion, _ = started
+    assert fusion[fusion.index("--proof") + 1] == proof
+    assert "--randomise" in parts[0].command("")
