@@ -22,6 +22,8 @@ from lira.hal.messages import CompressedImage, DepthImage, FloatArray, Image, La
 from lira.hal.profile import MAX_BINS, MAX_IMAGE_PX, RobotProfile
 
 Shape = tuple[int, ...]
+Look = Callable[[str], Any]
+"""Measures a sensor now, by its field of an observation; what comes is never stale."""
 LEAST_PX = 6  # two convolutions and a pooling leave one pixel of it
 
 
@@ -43,7 +45,7 @@ class Features(Mapping[str, FloatArray]):
 
     def __getattr__(self, name: str) -> FloatArray:
         if name.startswith("_") or name not in self._arrays:
-            raise AttributeError(f"these features have no '{name}', but {' and '.join(self._arrays) or 'nothing'}")
+            raise AttributeError(f"these features have no '{name}', but {' and '.join(self) or 'nothing'}")
         return self._arrays[name]
 
     def __iter__(self) -> Iterator[str]:
@@ -64,6 +66,38 @@ class Features(Mapping[str, FloatArray]):
     def mirrored(self) -> "Features":
         """Exchange left and right."""
         return Features(**{name: np.ascontiguousarray(array[..., ::-1]) for name, array in self.items()})
+
+
+class FeaturesSeen(Features):
+    """Features that are made when somebody asks for them: who looks at one sensor does not pay for another."""
+
+    __slots__ = ("_make",)
+
+    def __init__(self, make: Mapping[str, Callable[[], FloatArray]]) -> None:
+        super().__init__()
+        self._make = make
+
+    def __getitem__(self, name: str) -> FloatArray:
+        if name not in self._arrays:
+            self._arrays[name] = self._make[name]()
+        return self._arrays[name]
+
+    def __getattr__(self, name: str) -> FloatArray:
+        if not name.startswith("_") and name in self._make:
+            return self[name]
+        return super().__getattr__(name)
+
+    def __contains__(self, name: object) -> bool:
+        return name in self._make
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._make)
+
+    def __len__(self) -> int:
+        return len(self._make)
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return partial(Features, **dict(self)), ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -179,6 +213,14 @@ class Preprocessor:
                 raise
             self.invalid_beams += invalid
         return Features(**arrays)
+
+    def looking(self, look: Look) -> Features:
+        """Return features that are measured when somebody asks for them: of use until time goes on."""
+        return FeaturesSeen({row.name: partial(self._make, row, look) for row in self._modalities})
+
+    def _make(self, row: Modality, look: Look) -> FloatArray:
+        array, _ = row.read(look(row.name), self._profile)
+        return array
 
     def silent(self, observation: Observation) -> list[str]:
         """The sensors from which there is nothing."""

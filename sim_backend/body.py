@@ -165,7 +165,10 @@ class Body:
         self._judge()
 
     def _progress_m(self, hint_m: float | None) -> float:
-        return float(self.course.place(self.motion.xy, self.motion.yaw_rad, hint_m).progress_m)
+        motion, curve = self.motion, self.course.layout.curve
+        if hint_m is not None:
+            return curve.project_one(float(motion.x_m), float(motion.y_m), hint_m)[0]
+        return float(curve.project(motion.xy)[0])
 
     def _judge(self) -> None:
         """Let the referee look."""

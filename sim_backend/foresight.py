@@ -6,7 +6,8 @@ from dataclasses import dataclass
 import msgspec
 import numpy as np
 
-from lira.hal.messages import Action, Command, CourseState, Observation, Twist
+from lira.hal.bus.sensors import Stamped
+from lira.hal.messages import Action, Command, CourseState, Twist
 from lira.hal.profile import RobotProfile
 from lira.sim_backend import drive
 from lira.sim_backend.catalogue import load_world
@@ -22,6 +23,9 @@ from lira.sim_backend.world import World
 LOOK_PERIOD_S = 0.1
 # Boxes of which no part comes nearer than this to what can be reached are left out.
 CARE_M = 2.0
+
+Look = Callable[[str], Stamped]
+"""Measures a sensor now, by its field of an observation."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,7 +48,7 @@ class Imagined:
 class Foresight:
     """A second twin on the same floor, put where the first one is and let run ahead.
 
-    `rollout` renders what the imagined robot would see; `imagine` only moves it. Both use the twin's own drive model.
+    `rollout` renders what the imagined robot looks at; `imagine` only moves it. Both use the twin's own drive model.
     """
 
     def __init__(
@@ -63,7 +67,7 @@ class Foresight:
     def rollout(
         self,
         state: CourseState,
-        policy: Callable[[Observation], Action],
+        policy: Callable[[Look], Action],
         steps: int,
         period_s: float,
         ends: Callable[[CourseState], bool] = lambda _: False,
@@ -71,15 +75,16 @@ class Foresight:
     ) -> list[CourseState]:
         """Let `policy` drive from `state`: the state after each of `steps`.
 
-        The last is a collision, a loss, or the first that `ends` it: what comes after is not looked at. `first` is what
-        the policy does at `state`, if that is known: nothing is rendered for it then.
+        A policy gets a way to look, and only what it looks at is measured. The last state is a collision, a loss, or
+        the first that `ends` it: what comes after is not looked at. `first` is what the policy does at `state`, if that
+        is known: nothing is measured for it then.
         """
         twin, base = self._twin, self._profile.base
         twin.open()
         twin.place(self.course.layout.seed, state)
         states: list[CourseState] = []
         for _ in range(steps):
-            linear, angular = policy(twin.read()) if first is None else first
+            linear, angular = policy(twin.sense) if first is None else first
             first = None
             twist = Twist(linear * base.max_linear_m_s, angular * base.max_angular_rad_s)
             twin.drive(Command(twist, twin.now()))

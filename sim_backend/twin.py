@@ -7,7 +7,7 @@ from collections.abc import Iterator
 
 import msgspec
 
-from lira.hal.bus.sensors import observation_of, same_readings
+from lira.hal.bus.sensors import SENSORS, Stamped, observation_of, same_readings
 from lira.hal.errors import ConfigError, DeviceError
 from lira.hal.messages import STOP, Applied, Command, CourseState, Episode, Observation, Reason, Source, Twist
 from lira.hal.profile import Base, RobotProfile
@@ -21,6 +21,7 @@ from lira.sim_backend.shifts import surroundings
 from lira.sim_backend.world import World
 
 ODOMETRY_PERIOD_S = 0.05
+NAMES = {sensor.field: sensor.name for sensor in SENSORS}
 
 
 class Twin:
@@ -137,6 +138,20 @@ class Twin:
                 self._seq += 1
                 self._newest = last = observation
             return last
+
+    def sense(self, field: str) -> Stamped:
+        """Return the newest of one sensor, by its field of an observation, and measure no other.
+
+        For looking ahead, see `foresight`. Raises `KeyError` for a sensor that this robot does not have.
+        """
+        with self._sensor_lock:
+            if self._sensors is None:
+                raise DeviceError("the twin is not open", "Call open() first.")
+            with self._lock:
+                self._body.advance(self.now())
+                now_s, motion = self._body.time_s, self._body.motion
+            reading: Stamped = self._sensors.read(NAMES[field], motion, now_s)
+            return reading
 
     def reset(self, episode: Episode) -> None:
         """Put the robot down anew; a new layout only moves the boxes. Time goes on."""

@@ -6,7 +6,8 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from lira.hal.messages import Action, CourseState, Observation
+from lira.fusion.preprocess import Look
+from lira.hal.messages import Action, CourseState
 
 
 class Futures(Protocol):
@@ -41,7 +42,7 @@ class Foresight(Protocol):
     def rollout(
         self,
         state: CourseState,
-        policy: Callable[[Observation], Action],
+        policy: Callable[[Look], Action],
         steps: int,
         period_s: float,
         ends: Callable[[CourseState], bool],
@@ -49,7 +50,7 @@ class Foresight(Protocol):
     ) -> list[CourseState]:
         """Let a policy drive from `state`, with rendered sensors; ends early at a collision, lost line, or as told.
 
-        `first` is what it does there, if that is known already.
+        A policy gets a way to look. `first` is what it does there, if that is known already.
         """
 
     def imagine(self, state: CourseState, actions: NDArray[np.float64], period_s: float) -> Futures:

@@ -16,12 +16,12 @@ from msgspec import Meta
 from numpy.typing import NDArray
 
 from lira.fusion.learning.novice import HAND_TURN_RAD_S
-from lira.fusion.methods.base import STAND, Policy, Proposal
-from lira.fusion.preprocess import Features, Preprocessor
+from lira.fusion.methods.base import Policy, Proposal
+from lira.fusion.preprocess import Features, Look, Preprocessor
 from lira.fusion.teaching.foresight import Foresight
 from lira.fusion.teaching.planner import COMFORT_M, Planner
 from lira.hal.config import Table
-from lira.hal.messages import Action, Call, CourseState, Observation
+from lira.hal.messages import Action, Call, CourseState
 from lira.hal.profile import RobotProfile
 
 Share = Annotated[float, Meta(ge=0.0, le=1.0)]
@@ -243,12 +243,8 @@ class ScriptedTeacher:
         strayed = (off_m > settings.stray_m) & (clearance_m > settings.free_m)
         return settings.follow_line & ((off_m > settings.lateral_m) | strayed)
 
-    def _seeing(self, policy: Policy) -> Callable[[Observation], Action]:
-        def act(observation: Observation) -> Action:
-            features = self._preprocess(observation)
-            return STAND if features is None else policy(features)
-
-        return act
+    def _seeing(self, policy: Policy) -> Callable[[Look], Action]:
+        return lambda look: policy(self._preprocess.looking(look))
 
     def _reacts(self, now_s: float, danger: bool, *, alert: bool) -> bool:
         """Whether the hand moves now: a danger has lasted for as long as it takes to react to it."""

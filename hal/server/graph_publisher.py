@@ -14,6 +14,7 @@ from lira.hal.bus.topics import (
     ESTOP_LOOK,
     ESTOP_PRESS,
     ESTOP_RELEASE,
+    IN_LOCKSTEP,
     INFO,
     RESET,
     SIM_STATE,
@@ -33,16 +34,24 @@ INFOS: dict[str, Topic[CameraInfo]] = {"camera": CAMERA_INFO, "depth": DEPTH_INF
 
 
 class GraphPublisher:
-    """Describes one robot. `calibration` is what its camera really projects, None for the profile's pinhole."""
+    """Describes one robot. `calibration` is what its camera really projects, None for the profile's pinhole.
 
-    def __init__(self, bus: Bus, profile: RobotProfile, calibration: CameraInfo | None = None) -> None:
+    In `lockstep` what belongs to an observation waits for room as that does, rather than be dropped.
+    """
+
+    def __init__(
+        self, bus: Bus, profile: RobotProfile, calibration: CameraInfo | None = None, *, lockstep: bool = False
+    ) -> None:
         self._bus = bus
         self._boundary = bus.boundary
         self._profile = profile
         self._calibration = calibration
         self._shown_s: dict[str, float] = {}  # of which picture it was told what it shows, by sensor
         topics: tuple[Topic[Any], ...] = (TF, TF_STATIC, DESCRIPTION, *INFOS.values())
-        self._publishers: dict[str, Publisher[Any]] = {topic.key: bus.publisher(topic) for topic in topics}
+        self._publishers: dict[str, Publisher[Any]] = {
+            topic.key: bus.publisher(topic, IN_LOCKSTEP if lockstep and not topic.qos.latched else None)
+            for topic in topics
+        }
 
     def announce(self, *, arena: bool) -> None:
         """Make known to bridges to ROS 2 what the robot says and answers; what it is told it hears unannounced.

@@ -28,7 +28,7 @@ class SensorPublisher:
         self._lockstep = lockstep
         self._sent_s: dict[str, float] = {}
         qos = IN_LOCKSTEP if lockstep else None
-        self._graph = GraphPublisher(bus, profile, calibration)
+        self._graph = GraphPublisher(bus, profile, calibration, lockstep=lockstep)
         self._drift = Drift(profile.base)
         self._publishers: dict[str, Publisher[Any]] = {each.name: bus.publisher(each.topic, qos) for each in SENSORS}
 

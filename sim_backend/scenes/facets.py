@@ -39,7 +39,7 @@ class Facets:
         """Which of them may have a part in a view, [n]: never too few, at times a few too many."""
         bounds = (view.axes(pose) @ view.bounds).T
         reach_m = bounds @ eye + (0.0, 0.0, 0.0, 0.0, -NEAR_M, FAR_M)
-        inside: Flags = np.all(bounds @ self._centre <= self._radius_m + reach_m[:, None], axis=0)
+        inside: Flags = np.logical_and.reduce(bounds @ self._centre <= self._radius_m + reach_m[:, None], axis=0)
         return inside
 
 
@@ -50,13 +50,15 @@ def project(corners: Floats, view: View, pose: Pose, eye: Floats) -> Floats:
     """
     own = ((corners.reshape(-1, 3) - eye) @ view.axes(pose)).reshape(corners.shape)
     if own[..., 2].min() < NEAR_M:
-        near = np.any(own[..., 2] < NEAR_M, axis=1)
+        near = (own[..., 2] < NEAR_M).any(axis=1)
         pieces = [piece for face in own[near].tolist() for piece in cut(face)]
         own = np.concatenate([own[~near], np.array(pieces).reshape(-1, 4, 3)])
     right, up, ahead = own.transpose(2, 0, 1)
     wide, high = view.tangents
-    x = view.width_px / 2 * (1.0 + right / (wide * ahead))
-    return np.stack([x, view.height_px / 2 * (1.0 - up / (high * ahead))])
+    places = np.empty((2, *ahead.shape))
+    places[0] = view.width_px / 2 * (1.0 + right / (wide * ahead))
+    places[1] = view.height_px / 2 * (1.0 - up / (high * ahead))
+    return places
 
 
 def cut(face: list[list[float]]) -> list[list[list[float]]]:

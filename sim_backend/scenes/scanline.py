@@ -8,7 +8,7 @@ import numpy as np
 from lira.hal.messages import ByteArray
 from lira.sim_backend.polyline import Floats
 
-AFTER = [1, 2, 3, 0]  # each corner's next
+AFTER = np.array([1, 2, 3, 0])  # each corner's next
 
 
 def cover(picture: ByteArray, places: Floats, gray: int) -> None:
@@ -20,12 +20,13 @@ def cover(picture: ByteArray, places: Floats, gray: int) -> None:
     height_px, width_px = picture.shape
     # First row whose middle is below each corner, within the picture.
     row = np.ceil(np.minimum(np.maximum(places[1], 0.0), height_px) - 0.5).astype(np.intp)
-    rows = (row[:, AFTER] - row).reshape(-1)
-    edges = np.flatnonzero(rows)
+    rows = (row.take(AFTER, 1) - row).reshape(-1)
+    (edges,) = rows.nonzero()
     if not len(edges):
         return
     rows, row = rows[edges], row.reshape(-1)[edges]
-    begin, end = places.reshape(2, -1)[:, edges], places[:, :, AFTER].reshape(2, -1)[:, edges]
+    begin = places.reshape(2, -1).take(edges, 1)
+    end = places.take(AFTER, 2).reshape(2, -1).take(edges, 1)
     # Whichever way it is walked, an edge crosses a row at the very same place.
     down = rows > 0
     (x0, y0), (x1, y1) = np.where(down, begin, end), np.where(down, end, begin)
@@ -36,8 +37,9 @@ def cover(picture: ByteArray, places: Floats, gray: int) -> None:
     below = np.arange(len(edge)) - (np.cumsum(count) - count)[edge]
     column = np.minimum(np.maximum(np.ceil(at_first[edge] + below * slope[edge] - 0.5), 0.0), width_px)
     place = (first[edge] + below) * width_px + column.astype(np.intp)
-    order = np.argsort(place)
+    order = place.argsort()
     place, change = place[order], np.where(down, 1, -1)[edge[order]]
     # Every row ends as it began, with nothing: what crosses beyond its end counts from the beginning of the next.
-    covered = np.repeat(np.cumsum(change) != 0, np.diff(place, append=picture.size))
+    until = np.append(place[1:], picture.size)
+    covered = np.repeat(change.cumsum() != 0, until - place)
     np.copyto(picture.reshape(-1)[place[0] :], gray, where=covered)

@@ -35,11 +35,11 @@ class SketchScene:
         picture = backdrop(view, *self._backdrop)
         facets, eye = self._facets, view.eye(pose)
         facing = facets.facing(eye)
-        seen = np.flatnonzero(facing & facets.in_view(view, pose, eye))
+        (seen,) = (facing & facets.in_view(view, pose, eye)).nonzero()
         for group in self._far_to_near(seen, facing, eye):
             if not len(group):
                 continue
-            cover(picture, project(facets.corners[group], view, pose, eye), int(facets.gray[group[0]]))
+            cover(picture, project(facets.corners.take(group, 0), view, pose, eye), int(facets.gray[group[0]]))
         return picture
 
     def _far_to_near(self, seen: Indices, facing: Flags, eye: Floats) -> Iterable[Indices]:

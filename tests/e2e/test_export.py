@@ -88,7 +88,7 @@ def test_the_data_set_goes_out_and_comes_back(run, tmp_path, capsys):
     kept = int(np.sum(rows["in_buffer"].to_pylist()))
     assert 0 < kept < len(rows)
     assert main(["import", str(tmp_path / "set"), "--run", str(tmp_path / "warm"), "--frames", "buffer"]) == 0
-    assert f"{kept} demonstrations" in capsys.readouterr().out
+    assert f"{kept} labels (" in capsys.readouterr().out
     before = sorted(each.action for each in read_demonstrations(run / "labels.lira") if each.stored)
     after = sorted(each.action for each in read_demonstrations(tmp_path / "warm/labels.lira"))
     assert len(before) - len(after) <= 0.05 * len(before)

@@ -305,7 +305,7 @@ def test_which_topic_is_meant_has_to_be_clear():
 def test_what_is_no_bag_is_told(tmp_path, capsys):
     (tmp_path / "nothing").mkdir()
     assert main(["import", str(tmp_path / "nothing"), "--run", str(tmp_path / "run")]) == 2
-    assert "is no bag" in capsys.readouterr().err
+    assert "neither a bag nor" in capsys.readouterr().err
 
 
 def test_a_bag_becomes_labels(tmp_path, capsys):

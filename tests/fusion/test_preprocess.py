@@ -1,4 +1,5 @@
 import math
+import pickle
 from dataclasses import replace
 
 import cv2
@@ -9,7 +10,7 @@ from hypothesis import strategies as st
 
 from lira.fusion.modalities.image import from_uint8, gray_image, to_uint8
 from lira.fusion.modalities.scan import bin_scan
-from lira.fusion.preprocess import Preprocessor
+from lira.fusion.preprocess import Features, Preprocessor
 from lira.hal.errors import SensorError
 from lira.hal.messages import CompressedImage, Image, LaserScan, Observation
 from lira.hal.profile import load_profile
@@ -264,6 +265,20 @@ def test_the_preprocessor_gives_features():
     assert features is not None
     assert features.scan.shape == (101,)
     assert features.image.shape == (32, 32)
+
+
+def test_what_is_measured_when_somebody_looks_is_what_is_measured_at_once():
+    there, looked = observation(), []
+    seen = Preprocessor(SIM).looking(lambda field: looked.append(field) or getattr(there, field))
+    whole = Preprocessor(SIM)(there)
+    assert (list(seen), "image" in seen, "depth" in seen, looked) == (list(whole), True, False, [])
+    np.testing.assert_array_equal(seen.scan, whole.scan)
+    assert seen["scan"] is seen.scan
+    assert looked == ["scan"]
+    np.testing.assert_array_equal(seen.mirrored().image, whole.mirrored().image)
+    assert isinstance(pickle.loads(pickle.dumps(seen)), Features)
+    with pytest.raises(AttributeError, match="no 'depth', but image and scan"):
+        _ = seen.depth
 
 
 @pytest.mark.parametrize("absent", ["scan", "image"])

@@ -7,13 +7,14 @@ import sys
 import time
 import xml.etree.ElementTree as ET
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from tf_tree import TfBuffer
 from wiring import joined, real_time_null, served, wait_for
 
-from lira.hal.bus.topics import CAMERA, CAMERA_INFO, DESCRIPTION, ODOM, SCAN, TF, TF_STATIC
+from lira.hal.bus.topics import CAMERA, CAMERA_INFO, DESCRIPTION, IN_LOCKSTEP, ODOM, SCAN, TF, TF_STATIC
 from lira.hal.clock import unix_offset_s
 from lira.hal.description.camera_info import info_for, load_calibration, pinhole
 from lira.hal.description.drift import Drift
@@ -26,6 +27,7 @@ from lira.hal.messages.compression import compress, compress_depth
 from lira.hal.messages.images import size_of
 from lira.hal.messages.ros_table import CODECS
 from lira.hal.profile import known_profiles, load_profile
+from lira.hal.server.graph_publisher import GraphPublisher
 from lira.hal.testing import NullRobot
 from lira.robot.settings import load_camera_info
 
@@ -251,3 +253,13 @@ def test_tf_of_a_drive_runs_forward_in_time():
 def test_a_clock_that_counts_from_1970_is_left_alone_and_another_is_measured_once():
     assert unix_offset_s(lambda: 1.7e9) == 0.0
     assert unix_offset_s(lambda: 100.0, lambda: 1.7e9) == 1.7e9 - 100.0
+
+
+@pytest.mark.parametrize("lockstep", [True, False])
+def test_in_lockstep_what_belongs_to_an_observation_is_not_dropped_and_what_is_latched_stays_so(lockstep):
+    asked = {}
+    bus = SimpleNamespace(boundary=None, publisher=lambda topic, qos: asked.setdefault(topic.key, qos))
+    GraphPublisher(bus, load_profile("thesis-sim"), lockstep=lockstep)
+    waits = IN_LOCKSTEP if lockstep else None
+    assert asked.pop("tf_static") is asked.pop("robot_description") is None
+    assert asked == {"tf": waits, "camera/color/camera_info": waits, "camera/depth/camera_info": waits}

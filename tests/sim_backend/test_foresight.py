@@ -6,10 +6,14 @@ import sys
 import numpy as np
 import pytest
 
+from lira.fusion.experts.load import load_policy
 from lira.fusion.modalities.image import gray_image
+from lira.fusion.preprocess import Preprocessor
 from lira.hal.messages import Episode
 from lira.hal.profile import load_profile
+from lira.sim_backend.camera import PinholeCamera
 from lira.sim_backend.foresight import Foresight, with_small_camera
+from lira.sim_backend.lidar import RayLidar
 from lira.sim_backend.twin import Twin
 
 
@@ -60,19 +64,34 @@ def test_a_look_ahead_goes_on_from_where_one_has_ended():
     profile = load_profile("thesis-sim")
     twin, foresight = Twin(profile, "line-obstacles", layout=3), Foresight(profile, "line-obstacles", 3)
 
-    def towards_the_light(seen):
-        return 1.0, float(np.clip(seen.image.data[:, :16].mean() / seen.image.data[:, 16:].mean() - 1.0, -1.0, 1.0))
+    def towards_the_light(look):
+        seen = look("image").data
+        return 1.0, float(np.clip(seen[:, :16].mean() / seen[:, 16:].mean() - 1.0, -1.0, 1.0))
 
     twin.reset(Episode(3, start_m=4.0, yaw_rad=0.1))
     whole = foresight.rollout(twin.state(), towards_the_light, 8, 0.2)
     twin.open()
-    first = towards_the_light(twin.read())  # what is done with what is seen already
+    first = towards_the_light(twin.sense)  # what is done with what is seen already
     begun = foresight.rollout(twin.state(), towards_the_light, 3, 0.2, first=first)
     for one, other in zip([*begun, *foresight.rollout(begun[-1], towards_the_light, 5, 0.2)], whole, strict=True):
         assert (one.x_m, one.y_m, one.yaw_rad) == pytest.approx((other.x_m, other.y_m, other.yaw_rad), abs=1e-9)
         assert (one.progress_m, one.clearance_m) == pytest.approx((other.progress_m, other.clearance_m), abs=1e-9)
     foresight.close()
     twin.close()
+
+
+def test_what_nobody_looks_at_is_not_measured(monkeypatch):
+    profile, drawn, scanned = load_profile("thesis-sim"), [], []
+    render, scan = PinholeCamera.render, RayLidar.scan
+    monkeypatch.setattr(PinholeCamera, "render", lambda self, pose: drawn.append(1) or render(self, pose))
+    monkeypatch.setattr(RayLidar, "scan", lambda self, *words: scanned.append(1) or scan(self, *words))
+    twin, foresight = Twin(profile, "line-obstacles"), Foresight(profile, "line-obstacles")
+    lidar, both = load_policy("lidar-expert", profile).act, Preprocessor(profile)
+    foresight.rollout(twin.state(), lambda look: lidar(both.looking(look)), 4, 0.2)
+    assert (len(drawn), len(scanned)) == (0, 4)
+    foresight.rollout(twin.state(), lambda look: (0.5, float(both.looking(look).image.mean())), 3, 0.2)
+    assert (len(drawn), len(scanned)) == (3, 4)
+    foresight.close()
 
 
 def test_nothing_of_pybullet_is_loaded_for_a_sketch():

@@ -382,11 +382,12 @@ def test_the_policy_sees_what_it_would_see_there(twin):
     foresight = Foresight(SIM, "race", layout=2)
     robot = moving(twin, SIM)
     seen = []
-    foresight.rollout(robot.state(), lambda observation: seen.append(observation) or (0.0, 0.0), 1, 0.2)
+    foresight.rollout(robot.state(), lambda look: seen.extend(map(look, ("image", "scan"))) or (0.0, 0.0), 1, 0.2)
     foresight.close()
+    image, scan = seen
     real = robot.read()
-    assert np.array_equal(seen[0].image.data, real.image.data)
-    assert np.array_equal(seen[0].scan.ranges, real.scan.ranges)
+    assert np.array_equal(image.data, real.image.data)
+    assert np.array_equal(scan.ranges, real.scan.ranges)
 
 
 def test_a_rollout_ends_with_a_collision():

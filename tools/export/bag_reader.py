@@ -23,6 +23,7 @@ from lira.hal.messages.ros_table import CODECS, TYPES
 from lira.hal.profile import RobotProfile
 from lira.tools.export.demonstrations import Shown
 
+METADATA = "metadata.yaml"  # of a bag of ROS 2; one of ROS 1 is a file
 REMEDY = "Give the folder of a bag, or of a LeRobot data set."
 Heard = tuple[float, str, Any]  # when, for what, and which message
 BREAK_S = 2.0  # of silence: the next episode
@@ -52,6 +53,8 @@ def read_bag(path: Path, profile: RobotProfile, topics: Mapping[str, str]) -> It
     """
     if not path.exists():
         raise StorageError(f"there is no {path}", REMEDY)
+    if path.is_dir() and not (path / METADATA).exists():
+        raise StorageError(f"{path} is neither a bag nor a LeRobot data set", REMEDY)
     try:
         with AnyReader([path], default_typestore=TYPES) as bag:
             chosen = choose({each.topic: each.msgtype for each in bag.connections}, topics)

@@ -84,7 +84,11 @@ def _decided(moment: Moment, step: Step) -> list[str]:
     for expert in decided.experts:
         why = activity(expert, decided.threshold, settings)
         lines += _line(expert.name, iter([f"{spoken(expert.action)}   {why}"]))
-    known = "" if moment.novice is None else f"   {moment.novice.labels} labels, {moment.novice.steps} training steps"
+    known = (
+        ""
+        if moment.novice is None
+        else f"   {moment.novice.labels} labels learned, {moment.novice.steps} training steps"
+    )
     lines += _line("novice", iter([f"{spoken(decided.novice)}{known}"]))
     lines += _line("human", iter([spoken(step.human) if step.human else _absent(step)]))
     lines += _line("call", iter([_call(decided.choice.call)]))

@@ -59,7 +59,7 @@ def train_expert(kind: str, task: str, profile: RobotProfile, seed: int, path: P
         cruise = measure_cruise(expert, profile, course)
         about = Checkpoint.of(expert, profile.name, command, seed, cruise)
         save_checkpoint(path, expert, replace(about, labels=novice.stored, training_steps=novice.training_steps))
-        print(f"{kind} expert: {novice.stored} labels, {novice.training_steps} training steps, saved to {path}")
+        print(f"{kind} expert: {novice.stored} labels learned, {novice.training_steps} training steps, saved to {path}")
     return passed
 
 
