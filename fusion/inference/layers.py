@@ -10,6 +10,7 @@ from lira.hal.messages import FloatArray
 
 SLOPE = np.float32(0.3)  # of the leaky rectifiers
 KERNEL = 3  # a convolution sees 3 x 3 pixels
+ROWS = 7  # that are convolved at a time
 
 
 def leaky_relu(x: FloatArray, scratch: FloatArray) -> FloatArray:
@@ -39,27 +40,33 @@ class Dense:
 
 
 class Convolution:
-    """3 x 3, valid, stride 1: the patches as columns (im2col), and one product of matrices.
+    """3 x 3, valid, stride 1: the patches as columns (im2col), and a product of matrices, a few rows at a time.
 
     A channel is its rows one behind the other, `pitch` values each, however many of them are valid: so the column of
     one place in the kernel is one piece of memory. Each convolution leaves two values more at the end of a row that
-    belong to no pixel.
+    belong to no pixel. The columns of a few rows stay in the cache, and leave room there for what others need.
     """
 
     def __init__(self, weight: FloatArray, rows: int, pitch: int) -> None:
         """`weight` float32 [out, in, 3, 3]; the input has so many rows."""
         filters, channels = weight.shape[:2]
-        taken = (rows - KERNEL + 1) * pitch
         padded = np.zeros((channels, rows * pitch + KERNEL - 1), np.float32)  # the last pixel's patch ends behind it
         self.input = padded[:, : rows * pitch]
-        channel, value = padded.strides
-        kernel = (channels, KERNEL, KERNEL, taken)
-        self._patches = as_strided(padded, kernel, (channel, value * pitch, value, value), writeable=False)
-        self._columns = np.empty(kernel, np.float32)
         self._weight = np.ascontiguousarray(weight).reshape(filters, -1)
-        self._out = np.empty((filters, taken), np.float32)
+        self._out = np.empty((filters, (rows - KERNEL + 1) * pitch), np.float32)
+        columns = np.empty(self._weight.shape[1] * ROWS * pitch, np.float32)
+        channel, value = padded.strides
+        self._pieces = []
+        for begin in range(0, self._out.shape[1], ROWS * pitch):
+            out = self._out[:, begin : begin + ROWS * pitch]
+            kernel = (channels, KERNEL, KERNEL, out.shape[1])
+            places = (channel, value * pitch, value, value)
+            patches = as_strided(padded[:, begin:], kernel, places, writeable=False)
+            self._pieces.append((patches, columns[: patches.size].reshape(kernel), out))
 
     def __call__(self) -> FloatArray:
         """Return the output [out, (rows - 2) * pitch] of what is in `input`; the next call writes over it."""
-        np.copyto(self._columns, self._patches)
-        return np.matmul(self._weight, self._columns.reshape(self._weight.shape[1], -1), out=self._out)
+        for patches, columns, out in self._pieces:
+            np.copyto(columns, patches)
+            np.matmul(self._weight, columns.reshape(self._weight.shape[1], -1), out=out)
+        return self._out

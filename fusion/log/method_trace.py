@@ -14,7 +14,7 @@ import numpy as np
 
 from lira.fusion.learning.labels import Label
 from lira.fusion.learning.learned_policy import LearnedPolicy
-from lira.fusion.methods.base import Choice, Chooser, Lesson, Method, Policy, Proposal
+from lira.fusion.methods.base import Around, Choice, Chooser, Lesson, Method, Policy, Proposal
 from lira.fusion.preprocess import MODALITIES, Features, shapes_of
 from lira.hal.messages import Action, CallName, ExpertView, FeatureArray, MethodCall, MethodCalls, Phase
 from lira.hal.profile import RobotProfile
@@ -122,23 +122,13 @@ class _Notes:
             self._calls, self._bytes = [], 0
 
 
-class TracedMethod(Method):
+class TracedMethod(Around):
     """A method, or a driver that it gave, whose calls are told."""
 
     def __init__(self, method: Method, notes: _Notes, target: int = 0) -> None:
-        self._method, self._notes, self._target = method, notes, target
-        self.novice, self.experts = method.novice, method.experts
+        super().__init__(method)
+        self._notes, self._target = notes, target
         self._state = State.of(self.novice, weights=False)
-
-    @property
-    def begins_alone(self) -> bool:
-        """As it is."""
-        return self._method.begins_alone
-
-    @property
-    def calls_alone(self) -> bool:
-        """As it is."""
-        return self._method.calls_alone
 
     def remember(self, label: Label) -> None:
         """Have the novice take in a label from before."""
@@ -172,10 +162,6 @@ class TracedMethod(Method):
         self._notes.add(CallName.LEARN, self._target, Learned.of(lesson), action=human)
         self._notes.flush()
         return lesson
-
-    def policy(self, driver: str) -> Policy:
-        """As it is: to look ahead changes nothing."""
-        return self._method.policy(driver)
 
     def alone(self, phase: Phase) -> Method:
         """Return what drives alone; it is told of, too."""

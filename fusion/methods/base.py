@@ -177,6 +177,61 @@ class Method(ABC):
         self.novice.close()
 
 
+class Around(Method):
+    """A method around another one, which does all that is not said otherwise here."""
+
+    def __init__(self, method: Method) -> None:
+        self._method = method
+        self.novice, self.experts = method.novice, method.experts
+
+    @property
+    def begins_alone(self) -> bool:
+        """As the other does."""
+        return self._method.begins_alone
+
+    @property
+    def calls_alone(self) -> bool:
+        """As the other does."""
+        return self._method.calls_alone
+
+    @property
+    def drives_several(self) -> bool:
+        """As the other does."""
+        return self._method.drives_several
+
+    def reset(self) -> None:
+        """Begin an episode."""
+        self._method.reset()
+
+    def update(self, now_s: float) -> None:
+        """Train, and adopt what training has brought."""
+        self._method.update(now_s)
+
+    def remember(self, label: Label) -> None:
+        """Take in a label from before."""
+        self._method.remember(label)
+
+    def propose(self, features: Features) -> Proposal:
+        """Propose what the other does."""
+        return self._method.propose(features)
+
+    def learn(self, proposal: Proposal, human: Action | None) -> Lesson:
+        """Learn what the other does."""
+        return self._method.learn(proposal, human)
+
+    def policy(self, driver: str) -> Policy:
+        """The policy behind a driver's name."""
+        return self._method.policy(driver)
+
+    def alone(self, phase: Phase) -> Method:
+        """What drives without a teacher."""
+        return self._method.alone(phase)
+
+    def close(self) -> None:
+        """End the training, in bounded time."""
+        self._method.close()
+
+
 @runtime_checkable
 class Chooser(Protocol):
     """A method that a person may tell which expert shall drive: the answer to a call."""

@@ -14,7 +14,7 @@ from typing import Literal
 
 import numpy as np
 
-from lira.fusion.methods.base import Choice, Lesson, Method, Policy, Proposal
+from lira.fusion.methods.base import Around, Choice, Lesson, Method, Proposal
 from lira.fusion.methods.lira import LiraSpf
 from lira.fusion.preprocess import Features
 from lira.hal.config import Table
@@ -48,29 +48,25 @@ def similar_expert(r: Sequence[Example], limit: float) -> int | None:
     return nearest if nearest < error.size - 1 and error[nearest] < limit else None
 
 
-class SharedFeedback(Method):
+class SharedFeedback(Around):
     """LIRA-SPF, and after a take-over the expert that the human drove like."""
 
     def __init__(self, lira: LiraSpf, settings: SharingSettings) -> None:
-        self._lira, self.novice, self.experts = lira, lira.novice, lira.experts
+        super().__init__(lira)
         self._settings = settings
         self._limit = (lira.settings.consensus * lira.settings.action_range) ** 2
         self.reset()
 
     def reset(self) -> None:
         """R is empty, and nobody has priority."""
-        self._lira.reset()
+        self._method.reset()
         self._r: list[Example] = []
         self._expert: int | None = None  # who has priority
         self._left = 0
 
-    def update(self, now_s: float) -> None:
-        """Train, and adopt what training has brought."""
-        self._lira.update(now_s)
-
     def propose(self, features: Features) -> Proposal:
         """The expert with priority, if there is one, else what LIRA-SPF decides."""
-        proposal = self._lira.propose(features)
+        proposal = self._method.propose(features)
         if self._expert is None or not self.novice.trained:
             return proposal
         view = proposal.experts[self._expert]
@@ -79,16 +75,12 @@ class SharedFeedback(Method):
 
     def learn(self, proposal: Proposal, human: Action | None) -> Lesson:
         """Learn as LIRA-SPF does, and read the intention of whoever drove."""
-        lesson = self._lira.learn(proposal, human)
+        lesson = self._method.learn(proposal, human)
         if human is not None:
             self._watch(proposal, human)
         else:
             self._follow()
         return lesson
-
-    def policy(self, driver: str) -> Policy:
-        """The policy behind a driver's name."""
-        return self._lira.policy(driver)
 
     def _watch(self, proposal: Proposal, human: Action) -> None:
         if not self.novice.trained:  # the initial demonstration answers nothing

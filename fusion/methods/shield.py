@@ -23,11 +23,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from lira.fusion.learning.labels import Label
-from lira.fusion.methods.base import STAND, Choice, Lesson, Method, Policy, Proposal
+from lira.fusion.methods.base import STAND, Around, Choice, Lesson, Method, Policy, Proposal
 from lira.fusion.preprocess import Features
 from lira.hal.errors import ConfigError
-from lira.hal.messages import Action, Call, Driver, FloatArray
+from lira.hal.messages import Action, Call, Driver, FloatArray, Phase
 from lira.hal.profile import RobotProfile
 
 HORIZON_S = 1.2  # t_T
@@ -90,34 +89,16 @@ def arcs(v_m_s: float, w_rad_s: Floats) -> Floats:
     return np.stack([chord * np.cos(half), chord * np.sin(half)], axis=2)
 
 
-class Shielded(Method):
+class Shielded(Around):
     """A method that drives alone, behind a shield."""
 
     def __init__(self, method: Method, shield: Shield) -> None:
-        self._method = method
+        super().__init__(method)
         self._shield = shield
-        self.novice, self.experts = method.novice, method.experts
-
-    def reset(self) -> None:
-        """Begin an episode."""
-        self._method.reset()
-
-    def update(self, now_s: float) -> None:
-        """As without a shield."""
-        self._method.update(now_s)
-
-    def remember(self, label: Label) -> None:
-        """As without a shield."""
-        self._method.remember(label)
 
     def propose(self, features: Features) -> Proposal:
         """What the method proposes, with a turn that is clear. `Proposal.novice` still says what the novice wanted."""
         return self._clear(self._method.propose(features))
-
-    @property
-    def drives_several(self) -> bool:
-        """As without a shield."""
-        return self._method.drives_several
 
     def propose_all(self, seen: Sequence[Features]) -> list[Proposal]:
         """The same for several robots."""
@@ -144,16 +125,6 @@ class Shielded(Method):
         inner = self._method.policy(driver)
         return lambda features: self._shield(inner(features), features.scan)
 
-    @property
-    def begins_alone(self) -> bool:
-        """As without a shield."""
-        return self._method.begins_alone
-
-    @property
-    def calls_alone(self) -> bool:
-        """As without a shield: one that stands since no way is clear is as mute as any robot that nobody watches."""
-        return self._method.calls_alone
-
-    def close(self) -> None:
-        """End the training, in bounded time."""
-        self._method.close()
+    def alone(self, phase: Phase) -> Method:
+        """What drives without a teacher, behind the same shield."""
+        return Shielded(self._method.alone(phase), self._shield)

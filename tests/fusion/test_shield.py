@@ -7,12 +7,12 @@ import msgspec
 import numpy as np
 import pytest
 
-from lira.fusion.methods.base import STAND, Alone, Method
+from lira.fusion.methods.base import STAND, Alone, Around, Method
 from lira.fusion.methods.shield import HORIZON_S, MARGINS_M, STEPS, Shield, Shielded, arcs
 from lira.fusion.methods.stop_and_ask import Doubtful
 from lira.fusion.preprocess import Features
 from lira.hal.errors import ConfigError
-from lira.hal.messages import Call
+from lira.hal.messages import Call, Phase
 from lira.hal.profile import load_profile
 
 SIM, REAL = load_profile("thesis-sim"), load_profile("rosbot2")
@@ -181,9 +181,9 @@ class TestShielded:
         method.close()
         assert told == ["reset", 3.0, "close"]
         assert method.calls_alone
-        assert {name for name in vars(Method) if not name.startswith("_")} - set(vars(Shielded)) <= {
-            "novice",
-            "experts",
-            "learns",
-            "alone",
-        }
+        passed_on = {"novice", "experts", "learns", "propose_all"}  # which follow from the others
+        assert {name for name in vars(Method) if not name.startswith("_")} - set(vars(Around)) == passed_on
+
+    def test_what_drives_without_a_teacher_is_behind_the_same_shield(self):
+        alone = Shielded(Alone("novice", lambda _: (1.0, 0.0)), Shield(SIM)).alone(Phase.UNSEEN)
+        assert alone.propose(BOX).choice.driver == "shield"
