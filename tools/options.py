@@ -144,8 +144,10 @@ def add_expert(parser: argparse.ArgumentParser) -> None:
     )
 
 
-def add_protocol(parser: argparse.ArgumentParser, layouts: str | None = None, proof: str | None = None) -> None:
-    """Declare on which layouts is taught and what counts as proof; None: as the method says."""
+def add_protocol(
+    parser: argparse.ArgumentParser, layouts: str | None = None, usual_proof: str = "as the method does"
+) -> None:
+    """Declare on which layouts is taught, None: as the method says; and what counts as proof, usually `usual_proof`."""
     usual = "as the method does" if layouts is None else "%(default)s"
     parser.add_argument(
         "--layouts",
@@ -156,9 +158,8 @@ def add_protocol(parser: argparse.ArgumentParser, layouts: str | None = None, pr
     parser.add_argument(
         "--proof",
         metavar="own|fresh:K",
-        default=proof,
         help="what ends the teaching: the novice alone passes the lap it was just taught on (own), K layouts in a row "
-        f"that it has never seen (fresh:K), or K of N (fresh:K/N; default: {usual})",
+        f"that it has never seen (fresh:K), or K of N (fresh:K/N; default: {usual_proof})",
     )
 
 

@@ -13,6 +13,7 @@ import pytest
 from synthetic_run import write_run
 
 from lira.hal.errors import ConfigError
+from lira.tools.cli import main
 from lira.tools.launch.launch import Part
 from lira.tools.launch.processes import ProcessError
 from lira.tools.verbs.teach import demo
@@ -150,3 +151,16 @@ def test_missing_experts_are_named_before_anything_starts(tmp_path):
     assert done.returncode == 2
     assert done.stderr.splitlines()[0] == "lira demo: no camera expert comes with the profile 'mine'"
     assert not (tmp_path / "run").exists()
+
+
+@pytest.mark.parametrize(
+    ("words", "proof"),
+    [([], "fresh:3"), (["--world", "corridor"], "fresh:6"), (["--world", "corridor", "--proof", "own"], "own")],
+)
+def test_a_world_is_proven_as_its_task_says_unless_somebody_asks_for_something_else(words, proof, monkeypatch):
+    started = []
+    monkeypatch.setattr(demo, "supervise", lambda *words: started.extend(words) or 0)
+    assert main(["demo", *words, "--randomise"]) == 0
+    parts, fusion, _ = started
+    assert fusion[fusion.index("--proof") + 1] == proof
+    assert "--randomise" in parts[0].command("")

@@ -1,7 +1,7 @@
 """Watch a robot learn: the digital twin and the learner in two processes, over the same bus that drives the real robot.
 
 The experts drive where they agree, a scripted teacher helps where they do not, and a novice that sees both sensors
-learns from all of them, each lap on another layout. It is proven when it drives three fresh layouts in a row alone;
+learns from all of them, each lap on another layout. It is proven when it drives some fresh layouts in a row alone;
 after that it is shown more of them. It all takes a minute or two and leaves report.html in the run's folder.
 
 examples:
@@ -50,7 +50,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_layout(parser, "layout to learn on")
     add("--laps", type=natural, default=12, help="give up after so many training laps (default: %(default)s)")
     add("--unseen", type=natural, default=3, help="unseen layouts to drive afterwards (default: %(default)s)")
-    add_protocol(parser, layouts="fresh", proof="fresh:3")
+    add_protocol(parser, layouts="fresh", usual_proof="fresh:3; in corridor and table-top fresh:6")
     add("--shield", action="store_true", help="drive the unseen layouts behind a shield, as in `lira fusion`")
     add(
         "--wire",
@@ -86,7 +86,8 @@ def run(args: argparse.Namespace) -> int:
     profile = load_profile(robot)
     for expert in experts_of(profile):
         expert_path(expert, profile, task)
-    preset = method_named(args.method).taught(layouts=args.layouts, proof=args.proof)
+    proof = args.proof or f"fresh:{TASKS[task].proofs}"
+    preset = method_named(args.method).taught(layouts=args.layouts, proof=proof)
     require("safetensors", *preset.packages, *(["serial"] if args.wire else []))
     from lira.fusion.experts.load import load_policy  # not sooner: it takes the learner's libraries
 
@@ -100,7 +101,7 @@ def run(args: argparse.Namespace) -> int:
     twin += ["--layout", str(args.layout)]
     fusion = [*both, "--name", name, "--connect", endpoint, "--method", args.method, "--teacher", "scripted"]
     fusion += ["--run", str(folder), "--train-laps", str(args.laps), "--unseen", str(args.unseen)]
-    fusion += ["--layouts", args.layouts, "--proof", args.proof]
+    fusion += ["--layouts", args.layouts, "--proof", proof]
     fusion += ["--shield"] if args.shield else []
     fusion += ["--no-record"] if args.no_record else []
     fusion += [word for expert in args.expert for word in ("--expert", expert)]
