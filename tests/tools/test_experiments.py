@@ -1,6 +1,7 @@
 """Experiments: statistics against numbers worked out by hand, and real trials on a short world."""
 
 import numpy as np
+import psutil
 import pytest
 from short_trials import short_trial, timeless, write_world
 
@@ -51,6 +52,7 @@ def test_trials_do_not_depend_on_the_number_of_workers_and_resume(world, tmp_pat
     alone = run_trials(trials, tmp_path / "alone", Here(1))
     together = run_trials(trials, tmp_path / "together", Here(2))
     assert [timeless(each) for each in alone] == [timeless(each) for each in together]
+    assert not [child for child in psutil.Process().children() if "LokyProcess" in " ".join(child.cmdline())]
     assert alone[0].result.buffer > 0
     again = run_trials(trials, tmp_path / "alone", Here(1))
     assert again == alone  # to the wall-clock time: read, not run

@@ -23,9 +23,14 @@ class Here:
     def __call__(self, trials: Sequence[Trial]) -> Iterator[Outcome]:
         """Yield outcomes as they come."""
         from joblib import Parallel, delayed
+        from joblib.externals.loky import get_reusable_executor
 
         running = Parallel(n_jobs=self.workers, return_as="generator_unordered")
-        yield from running(delayed(play)(trial) for trial in trials)
+        try:
+            yield from running(delayed(play)(trial) for trial in trials)
+        finally:
+            if self.workers > 1:  # else they wait minutes for more, and this process for them
+                get_reusable_executor().shutdown(kill_workers=True)
 
 
 @dataclass(frozen=True, slots=True)
