@@ -193,8 +193,8 @@ ALONE = [demo, wired_demo, twin, twin_in_lockstep, wired_twin, robot, calibrate,
          experiment_in_processes, bench_latency, bench_soak, parity, stop_test, ros2]  # fmt: skip
 
 
-# Every verb by one of the signals; by both what serves, what starts others, and what computes.
-BY_BOTH = (twin, demo, training)
+# Every verb by one of the signals; by both what serves, and what starts others.
+BY_BOTH = (twin, demo)
 ENDED = [
     (verb, number) for k, verb in enumerate(ALONE) for number in (SIGNALS if verb in BY_BOTH else [SIGNALS[k % 2]])
 ]

@@ -80,7 +80,7 @@ def test_a_person_teaches_with_the_keyboard_alone(tmp_path):
         hand.hold("space")
         newest(applied, lambda a: a.source is Source.TELEOP)
         hand.hold("space", "up")
-        newest(decisions, lambda d: d.training_steps >= 1)
+        newest(decisions, lambda d: d.training_steps >= 1, READY_S)
         hand.hold()
         assert newest(decisions, lambda d: d.driver != "human").human is None
         hand.hold("p")

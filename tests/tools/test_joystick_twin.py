@@ -107,7 +107,7 @@ def test_a_press_takes_control_from_the_learner_which_labels_it(bed, hand, watch
         assert decision.human == pytest.approx((0.5, 0.0), abs=0.01)
         assert newest(applied, lambda a: a.source is Source.TELEOP).twist.linear_m_s > 0.0
         # It learns while the hand drives, until it can drive by itself.
-        newest(decisions, lambda d: d.training_steps >= 1)
+        newest(decisions, lambda d: d.training_steps >= 1, READY_S)
         bed.key(PAD, "BTN_TL", 0)
         newest(applied, lambda a: a.source is not Source.TELEOP)
         assert newest(decisions, lambda d: d.driver != "human").training_steps >= 1
