@@ -244,11 +244,15 @@ def test_results_are_written_from_the_summaries_that_are_there(tmp_path, capsys)
     where = ["--summaries", str(tmp_path), "--out", str(out)]
     assert main(["experiment", "results", *where]) == 2
     assert "holds no summary" in capsys.readouterr().err
-    (tmp_path / "race.json").write_text(to_json(summarise("race", "words", "command", 4, load("race"), compared(3))))
+    summary = summarise("race", "words", "command", 4, load("race"), compared(3))
+    (tmp_path / "race.json").write_text(to_json(msgspec.structs.replace(summary, commit="abc1234")))
     assert main(["experiment", "results", *where]) == 0
     half = 2 * len(compare.LIRA)  # fewer labels and fewer interventions agree, how many fewer does not
-    assert f"| [race](docs/results/race.md) | words | 4 | {half} | {half} |" in out.read_text()
-    assert f"| [race](race.md) | words | 4 | {half} | {half} |" in (tmp_path / document.PAGES / "index.md").read_text()
+    assert f"| [race](docs/results/race.md) | words | 4 | abc1234 | {half} | {half} |" in out.read_text()
+    assert (
+        f"| [race](race.md) | words | 4 | abc1234 | {half} | {half} |"
+        in (tmp_path / document.PAGES / "index.md").read_text()
+    )
     text = (tmp_path / document.PAGES / "race.md").read_text()
     assert f"| {HOLD} | hg-dagger | human_labels | 3 | 3 | 3 | 4 | 0 |" in text
     assert text.count("**agrees**") == half

@@ -27,10 +27,9 @@ are medians over the seeds unless a column says otherwise; intervals are 95 % bo
 that met its cap of laps is censored: it counts with what it had used by then, and is never dropped.
 `agrees` and `differs` are computed from the numbers; the likely causes are ours.
 
-All of them were played with the code of commit 00e2cd3 and have not been played again. Since then the scripted
-teacher, who now and then drove the line the wrong way and taught it, has been mended: means far above their medians are
-partly his, for every method. `plus` in them is the one of that commit: networks, with a memory of resolved calls and an
-ensemble's confidence.
+A row says with which commit an experiment was played. In those of 00e2cd3 the scripted teacher now and then drove the
+line the wrong way and taught it, so that means far above their medians are partly his, for every method; and `plus` in
+them is networks, with a memory of resolved calls and an ensemble's confidence.
 
 """
 
@@ -72,6 +71,7 @@ def overview(summary: Summary, link: str) -> Row:
         "experiment": f"[{summary.name}]({link})",
         "shows": summary.words,
         "seeds": summary.seeds,
+        "played with": summary.commit,
         "agrees": agrees,
         "differs": len(summary.findings) - agrees,
     }

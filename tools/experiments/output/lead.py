@@ -49,9 +49,10 @@ def lead(summaries: Sequence[Summary]) -> str:
     if main is None:
         return HEAD + NOT_YET
     elsewhere = [each for name, each in found.items() if name.startswith(f"{LED_BY}-")]
+    played = f"{main.trials} trials, played with {main.commit}" if main.commit else f"{main.trials} trials"
     parts = [
         HEAD,
-        f"\n`{main.command}`: {main.trials} trials; all tables are in [unseen](docs/results/unseen.md).\n{EFFORT}\n",
+        f"\n`{main.command}`: {played}; all tables are in [unseen](docs/results/unseen.md).\n{EFFORT}\n",
         table(effort(main)),
         f"\n![Layouts passed against human labels]({PICTURE})\n" if main.curves else "",
         f"\n## Deployed\n{DEPLOYED}\n" + table(deployed(main)),

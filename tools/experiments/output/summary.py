@@ -1,5 +1,6 @@
 """What is kept of an experiment in the repository: a small JSON file, from which RESULTS.md is made."""
 
+import subprocess
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -8,6 +9,7 @@ import msgspec
 from lira.hal.config import load_json, write_whole
 from lira.hal.errors import ConfigError, StorageError
 from lira.tools.experiments.experiment import Experiment, Finding, Outcomes, Row, Table
+from lira.tools.experiments.playing.fingerprint import ROOT
 
 MOST_BYTES = 2**24
 
@@ -16,7 +18,8 @@ class Summary(msgspec.Struct, frozen=True, omit_defaults=True):
     """An experiment's numbers. `results` are the rows of its first table, `ratios` empty where nothing is paired.
     `quality` and `curves` are there where an experiment tells how good the novices are on layouts they have not seen.
 
-    `fingerprints` says with which code and experts the trials were played: one for each pair of experts.
+    `fingerprints` says with which code and experts the trials were played: one for each pair of experts; `commit`, ""
+    outside a clone, on what it was summarised.
     """
 
     name: str
@@ -32,6 +35,7 @@ class Summary(msgspec.Struct, frozen=True, omit_defaults=True):
     findings: list[Finding]
     quality: list[Row] = []
     curves: list[Row] = []
+    commit: str = ""
 
 
 def summarise(name: str, words: str, command: str, seeds: int, experiment: Experiment, outcomes: Outcomes) -> Summary:
@@ -51,7 +55,17 @@ def summarise(name: str, words: str, command: str, seeds: int, experiment: Exper
         findings=experiment.findings(outcomes),
         quality=experiment.quality(outcomes),
         curves=experiment.curves(outcomes),
+        commit=commit(),
     )
+
+
+def commit() -> str:
+    """Return the commit of this clone, "" where there is none."""
+    asked = ["git", "-C", str(ROOT), "rev-parse", "--short=7", "HEAD"]
+    try:
+        return subprocess.run(asked, capture_output=True, text=True, check=True).stdout.strip()
+    except (OSError, subprocess.CalledProcessError):
+        return ""
 
 
 def to_json(summary: Summary) -> str:
