@@ -30,7 +30,8 @@ After each training lap the novice alone drives 12 fresh layouts. Effort to 90 %
 them were passed; who did not get there within the cap of laps (12, or `--laps`) is censored, and counts with what it
 had used. Unseen: 12 other layouts a run, which decided nothing, driven by the novice that had just reached 90 %,
 without any protection. Ratios are the method's effort over that of `plus`, pair by pair of one seed: medians, 95 %
-bootstrap intervals; labels without and with the demonstration, which is all that cloning takes.
+bootstrap intervals; labels without and with the demonstration, which is all that cloning takes. Who asks no
+expert does the same with every pair of them.
 """
 DEPLOYED = """
 The same novices on the same 12 layouts, as they are, behind the protective field, behind the shield, and with somebody
