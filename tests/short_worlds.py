@@ -1,4 +1,4 @@
-"""Worlds for tests that drive a whole lap: a straight line with one box on it."""
+"""A world for tests that drive a whole lap: a straight line with one box on it."""
 
 FEW_METRES = """
 description = "A few metres of straight line with one box on it"
@@ -12,19 +12,5 @@ y_m = 0.0
 
 [limits]
 finish_m = 8.0
-lost_m = 1.5
-"""
-SHORT = """
-description = "A short straight line with one box on it"
-
-[line]
-pieces = [{ straight_m = 18.0 }]
-
-[[box]]
-x_m = 6.0
-y_m = 0.0
-
-[limits]
-finish_m = 12.0
 lost_m = 1.5
 """
