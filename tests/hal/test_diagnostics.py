@@ -2,7 +2,7 @@
 
 import time
 
-from wiring import joined, new_endpoint, real_time_null, remote, served, wait_for
+from wiring import joined, new_endpoint, ready, real_time_null, remote, served, wait_for
 
 from lira.hal.bus.bus import Bus
 from lira.hal.bus.topics import CMD_VEL, DIAGNOSTICS
@@ -46,8 +46,9 @@ def test_what_is_refused_and_the_state_are_published():
     with served(real_time_null()) as robot, remote(robot) as client, joined(robot) as rival:
         reader = rival.reader(DIAGNOSTICS)
         client.drive(Command(STOP, client.now()))
+        commands = ready(rival)
         for _ in range(3):
-            rival.publisher(CMD_VEL).put(STOP, client.now())
+            commands.put(STOP, client.now())
             rival.put_raw(CMD_VEL, b"nonsense")
 
         def told():

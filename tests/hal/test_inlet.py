@@ -6,7 +6,7 @@ from types import SimpleNamespace
 
 import pytest
 import zenoh
-from wiring import PROFILE, joined, new_endpoint, new_name, real_time_null, remote, served, wait_for
+from wiring import PROFILE, joined, new_endpoint, new_name, ready, real_time_null, remote, served, wait_for
 
 from lira.hal.bus.attachment import Attachment
 from lira.hal.bus.boundary import Boundary
@@ -53,12 +53,6 @@ def pair():
 def put(client, topic, payload, attachment=None):
     """In order, and as fast as can be."""
     client._session.put(f"{client.robot}/{topic.key}", payload, attachment=attachment)
-
-
-def ready(client, *readers):
-    publisher = client.publisher(CMD_VEL)
-    wait_for(lambda: publisher.matching)
-    return publisher
 
 
 def test_a_repeated_command_renews_nothing(pair):
@@ -132,7 +126,7 @@ def test_a_poll_ends_although_there_is_always_more(payload):
 def test_a_press_among_ever_so_many_idle_messages_is_not_lost(pair):
     robot, client = pair
     inlet = Inlet(robot, PROFILE.control)
-    ready(client)
+    ready(client, ESTOP)
     put(client, ESTOP, encode(Bool(False)))
     time.sleep(0.2)
     assert not inlet.estop()
@@ -146,7 +140,7 @@ def test_a_press_among_ever_so_many_idle_messages_is_not_lost(pair):
 def test_a_press_that_is_shown_again_presses_once_whatever_came_between(pair):
     robot, client = pair
     inlet = Inlet(robot, PROFILE.control)
-    ready(client)
+    ready(client, ESTOP)
     press = Attachment(9, 1, 0).to_bytes()
     put(client, ESTOP, encode(Bool(True)), press)
     wait_for(inlet.estop)
@@ -219,7 +213,7 @@ def test_a_fault_with_one_message_is_counted_and_the_robot_goes_on(monkeypatch):
             submit(command)
 
         monkeypatch.setattr(robot.governed, "submit", fail_once)
-        other.publisher(CMD_VEL).put(GO, client.now())
+        ready(other).put(GO, client.now())
         wait_for(lambda: robot._bus.boundary.counts.get(("cmd_vel", "OverflowError")) == 1)
         wait_for(lambda: client.drive(Command(STOP, client.now())).reason is Reason.OK)
         assert robot.failure is None

@@ -5,8 +5,11 @@ import time
 import uuid
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from typing import Any
 
 from lira.hal.bus.bus import Bus
+from lira.hal.bus.publisher import Publisher
+from lira.hal.bus.topics import CMD_VEL, Topic
 from lira.hal.client.remote import RemoteRobot
 from lira.hal.messages import Observation
 from lira.hal.profile import load_profile
@@ -96,6 +99,13 @@ def joined(robot: Served) -> Iterator[Bus]:
         yield bus
     finally:
         assert bus.close()
+
+
+def ready(bus: Bus, topic: Topic[Any] = CMD_VEL) -> Publisher[Any]:
+    """Return a publisher once the robot's reader is known to the bus: what is put before, and not latched, is lost."""
+    with bus._session.declare_publisher(f"{bus.robot}/{topic.key}") as asks:
+        wait_for(lambda: asks.matching_status.matching)
+    return bus.publisher(topic)
 
 
 @contextmanager

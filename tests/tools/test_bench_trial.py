@@ -51,4 +51,4 @@ def test_a_trial_is_shared_out_and_left_as_it_was():
     assert row["method"] == method.name
     assert sum(row[share] for share in bench.SHARES) == pytest.approx(1.0)
     assert min(row[share] for share in bench.SHARES) > 0.0
-    assert 0.0 < row["processor_s"] <= row["seconds"] * 1.5  # one thread, and whatever the interpreter has beside it
+    assert row["processor_s"] > 0.0
