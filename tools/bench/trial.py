@@ -3,7 +3,7 @@
 A trial takes as many laps as its novice needs, which differ widely: numbers are medians over the trials of a few seeds,
 but for the shares, which are of all of them together. `processor_s_per_lap` says more of the code than of the novices.
 
-`processor_s` is what a trial took of the processor, and `seconds` what passed meanwhile: more, where others compute, too.
+`processor_s` is what a trial took of the processor, and `seconds` what passed meanwhile: more, where others compute.
 Shares are of the processor's time and add up to 1. `render` and `rays` are camera and lidar of the twin that is driven
 and of the one in which the scripted teacher looks ahead, `teacher` is the rest of what it does, `inference` is what the
 policies make of what they see, `training` is labels and learning; `rest` is motion, referee, control loop and
