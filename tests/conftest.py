@@ -107,6 +107,14 @@ def lock_files_of_their_own(tmp_path_factory: pytest.TempPathFactory) -> Iterato
         yield
 
 
+@pytest.fixture(autouse=True, scope="session")
+def as_nice_as_it_began() -> Iterator[None]:
+    """A verb that gives way to others must not do so for the process of the tests: all that come after it would wait."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(os, "nice", lambda _: 0)
+        yield
+
+
 def fail_if_unexpected(report: pytest.TestReport | pytest.CollectReport) -> None:
     """Turn a skip into a failure, unless it is expected."""
     if not report.skipped or hasattr(report, "wasxfail") or not isinstance(report.longrepr, tuple):
