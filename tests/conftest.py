@@ -55,9 +55,16 @@ def pytest_configure(config: pytest.Config) -> None:
 
 
 def pytest_ignore_collect(collection_path: Path, config: pytest.Config) -> bool | None:
-    """With `-m unit` do not even import what is none: that takes longer than the unit tests."""
-    asked, is_test = config.getoption("markexpr"), collection_path.match("test_*.py")
-    return True if asked == "unit" and is_test and kind_of(collection_path) != "unit" else None
+    """Do not even import what has no test of this run: all imports together take longer than the unit tests."""
+    if not collection_path.match("test_*.py"):
+        return None
+    if config.getoption("markexpr") == "unit" and kind_of(collection_path) != "unit":
+        return True
+    if config.getoption("alone"):
+        inside = f"{collection_path.relative_to(config.rootpath).as_posix()}::"
+        left_open = any(name.startswith(inside) for name in config.cache.get(OPEN, []))
+        return None if left_open or "mark.alone" in collection_path.read_text(encoding="utf-8") else True
+    return None
 
 
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
