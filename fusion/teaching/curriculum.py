@@ -38,6 +38,7 @@ TAUGHT, PROVEN = 0, 1  # streams of a seed's draws
 LAYOUTS = 1_000_000
 APART_M = 4.0  # two starts of a lap beside each other
 LEAST = 0.5  # of how far off the way a drive begins
+PROOFS = 3  # more of them are a matter of luck: of the shipped camera's ways back 3 % are too long
 
 
 @dataclass(frozen=True, slots=True)
@@ -160,15 +161,15 @@ def _table_top_depth() -> Curriculum:
     return Curriculum("table-top-train", teacher, drives, laps=20)
 
 
-def _anew(course: Curriculum, proofs: int) -> Curriculum:
+def _anew(course: Curriculum) -> Curriculum:
     """The same, each lap driven anew, where left and right are alike: an expert that is as good whatever its seed."""
-    return replace(course, proofs=proofs, mirrored=True, labels_per_step=10)
+    return replace(course, proofs=PROOFS, mirrored=True, labels_per_step=10)
 
 
 CURRICULA = {
     DEFAULT: {
-        "camera": _anew(_line_camera(STRICT, back_s=5.0, back_m=0.2), proofs=6),  # which is 48 starts beside the line
-        "lidar": _anew(_line_lidar(), proofs=3),  # and 54 forests
+        "camera": _anew(_line_camera(STRICT, back_s=5.0, back_m=0.2)),
+        "lidar": _anew(_line_lidar()),
     },
     "eight": {"camera": _line_camera(SKILLED)},  # Appendix C is about an expert taught as a person does: bang-bang
     "passage": {"camera": _passage(), "lidar": _passage()},
