@@ -6,6 +6,7 @@
 """
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import cast
 
@@ -74,11 +75,16 @@ def path(base: Base, now: Motion, linear_m_s: Floats, angular_rad_s: Floats, dur
         ahead = yaw[:, :-1] + half_turn
         x, y = _sums(now.x_m, chord * np.cos(ahead)), _sums(now.y_m, chord * np.sin(ahead))
         return Motion(x[:, 1:], y[:, 1:], yaw[:, 1:], linear_m_s, angular_rad_s)
-    states = []
+    moments = []
     for linear, angular in zip(linear_m_s.T, angular_rad_s.T, strict=True):
         now = step(base, now, linear, angular, duration_s)
-        states.append(now.arrays)
-    return Motion(*(np.stack(values, axis=-1) for values in zip(*states, strict=True)))
+        moments.append(now)
+    return in_time(moments)
+
+
+def in_time(moments: Sequence[Motion]) -> Motion:
+    """Moments of some robots [N] as arrays [N, K]."""
+    return Motion(*(np.stack(values, axis=-1) for values in zip(*(each.arrays for each in moments), strict=True)))
 
 
 def _sums(begin: Floats, terms: Floats) -> Floats:

@@ -21,6 +21,8 @@ from hypothesis import settings
 from kinds import TAKES_LONG, kind_of
 from loopback import take_own_loopback
 
+# The tests share the processors, and small matrices multiply no faster on several threads, which wait for each other.
+os.environ.setdefault("OMP_NUM_THREADS", "1")
 # A shell that runs the suite in the background ignores SIGINT, and so would every process that a test starts.
 signal.signal(signal.SIGINT, signal.default_int_handler)
 
@@ -55,9 +57,16 @@ def pytest_configure(config: pytest.Config) -> None:
 
 
 def pytest_ignore_collect(collection_path: Path, config: pytest.Config) -> bool | None:
-    """With `-m unit` do not even import what is none: that takes longer than the unit tests."""
-    asked, is_test = config.getoption("markexpr"), collection_path.match("test_*.py")
-    return True if asked == "unit" and is_test and kind_of(collection_path) != "unit" else None
+    """Do not even import what has no test of this run: all imports together take longer than the unit tests."""
+    if not collection_path.match("test_*.py"):
+        return None
+    if config.getoption("markexpr") == "unit" and kind_of(collection_path) != "unit":
+        return True
+    if config.getoption("alone"):
+        inside = f"{collection_path.relative_to(config.rootpath).as_posix()}::"
+        left_open = any(name.startswith(inside) for name in config.cache.get(OPEN, []))
+        return None if left_open or "mark.alone" in collection_path.read_text(encoding="utf-8") else True
+    return None
 
 
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
@@ -95,6 +104,14 @@ def lock_files_of_their_own(tmp_path_factory: pytest.TempPathFactory) -> Iterato
         folder = str(tmp_path_factory.mktemp("locks"))
         patch.setenv("TMPDIR", folder)
         patch.setattr(tempfile, "tempdir", folder)
+        yield
+
+
+@pytest.fixture(autouse=True, scope="session")
+def as_nice_as_it_began() -> Iterator[None]:
+    """A verb that gives way to others must not do so for the process of the tests: all that come after it would wait."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(os, "nice", lambda _: 0)
         yield
 
 

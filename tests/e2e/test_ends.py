@@ -21,7 +21,8 @@ READY_S = 90.0
 END_S = 10.0  # 3 s are promised; the rest is for a busy machine
 SIGNALS = (signal.SIGINT, signal.SIGTERM)
 SETTLE_S = 0.5
-WARM_S = 2.0
+WARM_S = 1.5
+ROOM = ("--world", "room", "--profile", "rosbot2", "--renderer", "sketch")
 
 
 class Stage:
@@ -49,9 +50,7 @@ class Stage:
         return self.start("twin", "twin", "--world", "line", *where, *words, ready="serves")
 
     def devices(self):
-        self.start(
-            "devices", "twin", "--world", "room", "--profile", "rosbot2", "--wire", self.folder / "wire", ready=OPEN
-        )
+        self.start("devices", "twin", *ROOM, "--wire", self.folder / "wire", ready=OPEN)
         return re.search(r"lira robot (.*)", self.line)[1].split()
 
 
@@ -112,8 +111,8 @@ def twin_in_lockstep(stage):
 
 
 def wired_twin(stage):
-    words = ["--world", "room", "--profile", "rosbot2", "--wire", stage.folder / "wire", "--arena", stage.endpoint]
-    return stage.start("twin", "twin", *words, ready=OPEN)
+    words = ["--wire", stage.folder / "wire", "--arena", stage.endpoint]
+    return stage.start("twin", "twin", *ROOM, *words, ready=OPEN)
 
 
 def robot(stage):
@@ -167,7 +166,7 @@ def bench_soak(stage):
 
 
 def parity(stage):
-    return warmed(stage.start("parity", "parity", ready="twin: ..."))
+    return warmed(stage.start("parity", "parity", "--profile", "thesis-sim", ready="twin: ..."))
 
 
 def stop_test(stage):
@@ -219,9 +218,10 @@ CLIENTS = {
 @pytest.mark.parametrize(("lot", "turn"), [("there", 0), ("killed", 1), ("frozen", 0)])
 def test_a_signal_ends_a_client_whatever_became_of_its_robot(stage, lot, turn):
     robot, clients = stage.twin(), []
-    for client, (words, ready) in CLIENTS.items():
-        told = [word.format(folder=stage.folder) for word in words]
-        clients.append(stage.start(client, *told, *stage.connect, ready=ready))
+    for client, (words, _) in CLIENTS.items():
+        clients.append(stage.start(client, *(word.format(folder=stage.folder) for word in words), *stage.connect))
+    for process, (_, ready) in zip(clients, CLIENTS.values(), strict=True):
+        process.wait_ready(ready, READY_S)
     time.sleep(SETTLE_S)
     if lot != "there":
         os.kill(robot.pid, signal.SIGKILL if lot == "killed" else signal.SIGSTOP)
