@@ -179,9 +179,13 @@ class ControlLoop:
         return applied
 
     def _learn(self, method: Method, proposal: Proposal, applied: Applied) -> Lesson:
-        """Learn from what was applied, not from what was wished for: nothing if the robot was held."""
+        """Learn from what was applied, not from what was wished for: nothing if the robot was held.
+
+        What the protective field took is learned all the same: it will be there when the novice drives, too, and who
+        learned to be slow where it slows, and to stand where it stops, would never get past.
+        """
         if applied.source is Source.TELEOP:
-            return method.learn(proposal, to_action(applied.twist, self._base))
+            return method.learn(proposal, to_action(applied.unhindered, self._base))
         if applied.source is Source.POLICY and applied.reason is Reason.OK:
             return method.learn(proposal, None)
         return Lesson(Choice(Driver.NOBODY, STAND))

@@ -1,7 +1,8 @@
 """`plus`: LIRA-SPF with what the thesis leaves to future work. Each part can be switched off in `PlusSettings`.
 
 - Pre-fill: before anybody teaches it, the novice learns what the first expert does while the others are quiet, and
-  what active experts agree on.
+  what active experts agree on. Where they disagree the first drives on, until the human has driven once: from then on
+  the novice does, as in Algorithm 1, since it alone has learned from that.
 - Reservation: an expert's label counts only once a second has passed without the human correcting what the expert did.
 - A choice as an answer: instead of driving, the human may give control to an expert for a while.
 - Practice: a novice that was once examined drives as it will alone, and is only corrected.
@@ -14,6 +15,7 @@ from collections import deque
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
+from lira.fusion.learning.labels import Label
 from lira.fusion.learning.novice import Novice
 from lira.fusion.methods.base import AsTaught, Choice, Expert, Lesson, Method, Policy, Proposal, Settled
 from lira.fusion.methods.context import Context, MethodSettings
@@ -47,6 +49,7 @@ class LiraPlus(LiraSpf):
         self._reserve = round(settings.reserve_s / period_s)
         self._handover_steps = round(settings.handover_s / period_s)
         self._gifts = 0
+        self._shown = False  # whether the human has driven
         self._examined = False
         super().__init__(experts, novice, settings.lira, period_s)
 
@@ -55,6 +58,11 @@ class LiraPlus(LiraSpf):
         super().reset()
         self._reserved: deque[Proposal] = deque()
         self._driver, self._left = "", 0
+
+    def remember(self, label: Label) -> None:
+        """Take in a label from before."""
+        super().remember(label)
+        self._shown |= label.source == Driver.HUMAN
 
     @property
     def begins_alone(self) -> bool:
@@ -94,7 +102,7 @@ class LiraPlus(LiraSpf):
         objection = human is not None or (proposal.choice.given and self._left == self._handover_steps)
         dropped = self._drop() if objection else ()
         if human is not None:
-            self._left = 0
+            self._shown, self._left = True, 0
             return replace(super().learn(proposal, human), settled=dropped)
         self._left = max(0, self._left - 1)
         if not self._reserve or proposal.choice.label is None:
@@ -135,14 +143,14 @@ class LiraPlus(LiraSpf):
 
     def _prefill(self, proposal: Proposal) -> Proposal:
         """The first expert drives, or another that alone is active; the human is called where they disagree."""
-        first = self.experts[0].name
-        a_1 = proposal.experts[0].action
-        choice = choose(None, proposal.experts, a_1, self._consensus)
-        if choice.driver == Driver.NOVICE:  # nobody is active, or they disagree
-            choice = replace(choice, driver=first, label=a_1 if choice.call is Call.NONE else None)
+        first, a_1 = self.experts[0].name, proposal.experts[0].action
+        choice = choose(None, proposal.experts, proposal.novice, self._consensus)
+        called = choice.call is Call.FEEDBACK
+        if choice.driver == Driver.NOVICE and not (called and self._shown and self.novice.trained):
+            choice = replace(choice, driver=first, action=a_1, label=None if called else a_1)
         elif choice.driver not in (first, Driver.MEAN):
             choice = replace(choice, label=None)
-        return replace(proposal, choice=choice, speed=self.settings.slow_down if choice.call is Call.FEEDBACK else 1.0)
+        return replace(proposal, choice=choice, speed=self.settings.slow_down if called else 1.0)
 
     def _sure(self, features: Features) -> bool:
         """Whether the novice knows what to do here."""

@@ -36,7 +36,7 @@ class TeacherSettings(Table, frozen=True):
     lateral_m: float = 1.0  # further than this from the line is danger
     stray_m: float = 0.45  # and so is this where no box is within `free_m`: there is nothing to drive around
     free_m: float = 1.0
-    back_m: float = 0.2  # and so is to drive so far back along the line within the horizon
+    back: Share = 0.13  # and so is to get so far back along the line, as a share of what full speed drives meanwhile
     follow_line: bool = True  # False: only the boxes matter, and to go straight on where there is none
     stall: Share = 0.3  # a policy that drives less than this share of full speed over the horizon stands in the way
     wander_rad: float = 0.1  # a larger turn within the horizon, without a box in the way, is wrong then
@@ -211,12 +211,16 @@ class ScriptedTeacher:
 
     def _turns_back(self, state: CourseState, drive: list[CourseState]) -> bool:
         """Whether the policy drives along the line the wrong way; never where there is no line."""
-        return drive[-1].progress_m < state.progress_m - self._settings.back_m
+        return drive[-1].progress_m < state.progress_m - self._settings.back * self._full_speed_m(self._steps)
 
     def _stalls(self, state: CourseState, drive: list[CourseState]) -> bool:
         x_m, y_m = np.array([(each.x_m, each.y_m) for each in (state, *drive)]).T
         driven_m = np.hypot(np.diff(x_m), np.diff(y_m)).sum()
-        return bool(driven_m < self._settings.stall * self._full_speed_m_s * self._period_s * len(drive))
+        return bool(driven_m < self._settings.stall * self._full_speed_m(len(drive)))
+
+    def _full_speed_m(self, steps: int) -> float:
+        """How far the robot gets at most within some steps."""
+        return self._full_speed_m_s * self._period_s * steps
 
     def _wanders(self, state: CourseState, drive: list[CourseState]) -> bool:
         """Whether the policy turns although the way straight ahead is free."""

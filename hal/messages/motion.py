@@ -87,6 +87,7 @@ class Applied:
 
     `commander`, `session` and `seq` name the command it came from, `command_age_s` says how old that was. `session` is
     a digest of the commander's epoch (`session_of`): it knows its own by that, and nobody learns the epoch.
+    `field_cut_m_s` is the forward speed that the protective field took from what was commanded, with its sign.
     """
 
     twist: Twist
@@ -99,6 +100,12 @@ class Applied:
     session: int = 0
     seq: int = -1
     commander: str = ""
+    field_cut_m_s: float = 0.0
+
+    @property
+    def unhindered(self) -> Twist:
+        """What the base would have got without the protective field."""
+        return Twist(self.twist.linear_m_s + self.field_cut_m_s, self.twist.angular_rad_s)
 
 
 def session_of(epoch: int) -> int:

@@ -47,6 +47,7 @@ def _applied_to(m: Applied) -> Any:
         m.session,
         m.seq,
         m.commander,
+        m.field_cut_m_s,
     )
 
 
@@ -62,6 +63,7 @@ def _applied_from(message: Any) -> Applied:
         message.session,
         message.seq,
         message.commander,
+        message.field_cut,
     )
 
 

@@ -77,11 +77,11 @@ class Governor:
         """Let time-outs strike and return what the wheels get now."""
         self._expire(now_s, -ROUNDING_S)
         command = self._in_charge()
-        twist, source, reason = STOP, Source.NONE, self._reason
+        twist, source, reason, cut_m_s = STOP, Source.NONE, self._reason, 0.0
         clamps = tuple(f"no_{name}" for name in self._lost)
         if self._state is State.ARMED and command is not None:
             source = command.source
-            twist, clamps = self._limit(command.twist, now_s)
+            twist, clamps, cut_m_s = self._limit(command.twist, now_s)
             if "field_stop" in clamps or "field_blind" in clamps:
                 reason = Reason.OBSTACLE
         self._last, self._last_s = twist, now_s
@@ -89,9 +89,8 @@ class Governor:
             return Applied(twist, now_s, source, reason, clamps)
         age_s = now_s - command.stamp_s
         session = session_of(command.epoch)
-        return Applied(
-            twist, now_s, source, reason, clamps, command.answers, age_s, session, command.seq, command.commander
-        )
+        asked = command.answers, age_s, session, command.seq, command.commander
+        return Applied(twist, now_s, source, reason, clamps, *asked, cut_m_s)
 
     def note_devices(self, lost: tuple[str, ...], losses: int) -> None:
         """Take in which devices are lost now, and how many losses there ever were: one between two looks counts too."""
@@ -195,20 +194,24 @@ class Governor:
         teleop = self._live.get(Source.TELEOP)
         return teleop is not None and not teleop.released
 
-    def _limit(self, wanted: Twist, now_s: float) -> tuple[Twist, tuple[str, ...]]:
-        """Cut to the profile's limits, then to what the field allows, then to what can be reached by now."""
+    def _limit(self, wanted: Twist, now_s: float) -> tuple[Twist, tuple[str, ...], float]:
+        """Cut to the profile's limits, then to what the field allows, then to what can be reached by now.
+
+        Returns what is left, the names of what cut it, and the speed in m/s that the field took.
+        """
         linear = min(max(wanted.linear_m_s, -self._limits[0]), self._limits[0])
         angular = min(max(wanted.angular_rad_s, -self._limits[1]), self._limits[1])
         clamps = ["linear"] if linear != wanted.linear_m_s else []
         clamps += ["angular"] if angular != wanted.angular_rad_s else []
+        asked = linear
         if self._field is not None:
-            linear, cut = limit_speed(self._field, self.clearance, linear, now_s)
+            linear, cut = limit_speed(self._field, self.clearance, asked, now_s)
             clamps += [cut] if cut else []
         passed_s = min(now_s - self._last_s, RAMP_S)
         ramped_linear = _ramp(linear, self._last.linear_m_s, self._ramps[0], passed_s)
         ramped_angular = _ramp(angular, self._last.angular_rad_s, self._ramps[1], passed_s)
         clamps += ["acceleration"] if (ramped_linear, ramped_angular) != (linear, angular) else []
-        return Twist(ramped_linear, ramped_angular), tuple(clamps)
+        return Twist(ramped_linear, ramped_angular), tuple(clamps), asked - linear
 
 
 def _ramp(wanted: float, before: float, limit: float | None, passed_s: float) -> float:

@@ -1,5 +1,6 @@
 from dataclasses import replace
 
+import numpy as np
 import pytest
 
 from lira.fusion.control import ControlLoop, to_action, to_twist
@@ -123,6 +124,25 @@ def test_what_was_applied_is_learned_not_what_was_wished_for(loop):
     method = Driver()
     loop.step(method, Hand((7.0, -7.0)))
     assert method.lessons == [(1.0, -1.0)]
+
+
+class Walled(NullRobot):
+    """It stands before a wall, as near as its protective field lets it come."""
+
+    def read(self):
+        seen = super().read()
+        return replace(seen, scan=replace(seen.scan, ranges=np.full_like(seen.scan.ranges, 0.15)))
+
+
+@pytest.mark.parametrize(("hand", "learned"), [((1.0, -0.5), [(1.0, -0.5)]), (None, [])])
+def test_what_the_field_took_from_a_hand_is_learned_and_nothing_of_a_policy_that_it_holds(hand, learned):
+    robot = GovernedRobot(null := Walled(load_profile("rosbot2")))
+    loop = ControlLoop(robot, truth=null.state)
+    loop.arm()
+    method = Driver()
+    step = loop.step(method, Hand(hand))
+    assert (step.applied.twist.linear_m_s, step.applied.reason) == (0.0, Reason.OBSTACLE)
+    assert method.lessons == [pytest.approx(action) for action in learned]
 
 
 @pytest.mark.parametrize(("driver", "shown"), [("novice", True), ("camera", True), ("none", False)])

@@ -200,6 +200,7 @@ def test_a_governed_robot_stops_before_a_wall_says_why_and_backs_off():
     for _ in range(80):
         applied = step(GO)
     assert (applied.twist, applied.reason, applied.clamps) == (STOP, Reason.OBSTACLE, ("field_stop",))
+    assert (applied.field_cut_m_s, applied.unhindered) == (GO.linear_m_s, GO)
     assert 0.9 - FIELD.slow_m < inner.state().x_m + BASE.length_m / 2 < 1.0 - FIELD.stop_m / 2
     assert step(Twist(0.2, 1.0)).twist.angular_rad_s == 1.0
     assert step(Twist(-0.2, 0.0)).twist.linear_m_s < 0.0

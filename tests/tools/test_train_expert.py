@@ -24,9 +24,9 @@ def _as_it_was():
 def short(monkeypatch):
     """Set a curriculum of one drive along a straight line."""
 
-    def install(limit_s, goal="stay"):
+    def install(limit_s, goal="stay", **proof):
         drives = (Drive(Episode(), limit_s, goal),)
-        short = Curriculum("straight", STRICT, drives, laps=2)
+        short = Curriculum("straight", STRICT, drives, laps=2, **proof)
         monkeypatch.setitem(CURRICULA["line"], "camera", short)
 
     return install
@@ -51,10 +51,25 @@ def test_an_expert_that_fails_is_not_saved_and_the_old_one_stays(short, tmp_path
     path.write_bytes(b"the old one")
     assert cli.main(["train-expert", "camera", "--out", str(path)]) == 2
     assert capsys.readouterr().err.splitlines() == [
-        "lira train-expert: the expert did not pass its curriculum; nothing was saved",
-        "  Try another --seed.",
+        "lira train-expert: after 2 laps the camera expert of 'line' does not pass the lap that was taught; "
+        "nothing was saved",
+        "  Try another seed.",
     ]
     assert path.read_bytes() == b"the old one"
+
+
+def test_one_that_is_to_be_proven_anew_says_what_it_could_not_do(short, tmp_path, capsys):
+    short(8.0, "finish", proofs=3, mirrored=True, labels_per_step=10)
+    assert cli.main(["train-expert", "camera", "--out", str(tmp_path / "expert.safetensors")]) == 2
+    assert "after 2 laps the camera expert of 'line' does not pass 3 fresh laps in a row" in capsys.readouterr().err
+    assert not list(tmp_path.iterdir())
+
+
+def test_one_that_passes_fresh_laps_is_proven_by_each_of_them(short, tmp_path, capsys):
+    short(8.0, proofs=3, mirrored=True, labels_per_step=10)
+    assert cli.main(["train-expert", "camera", "--out", str(tmp_path / "expert.safetensors")]) == 0
+    lines = capsys.readouterr().out.splitlines()
+    assert [line.split()[2] for line in lines if line.startswith("proving run")][-3:] == ["1.1", "1.2", "1.3"]
 
 
 def test_a_place_that_cannot_be_written_is_named_before_the_training(tmp_path, capsys):

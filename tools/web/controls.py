@@ -19,9 +19,7 @@ class Controls:
     def __init__(self, client: TeleopClient, seat: Seat, say: Callable[[str], None] = print) -> None:
         self._client = client
         self._finder = PageFinder(seat, page_mapping())
-        self._bridge = Bridge(
-            client, self._finder, PadMemory(None), say, lambda: "nobody has the controls: press Drive on the page"
-        )
+        self._bridge = Bridge(client, self._finder, PadMemory(None), say, lambda: ADVICE)
         self._stop = threading.Event()
         self._thread = threading.Thread(target=self._bridge.run, args=(self._stop,), name="controls", daemon=True)
         self._thread.start()

@@ -1,8 +1,9 @@
 """Train one of a task's single-sensor experts with HG-DAgger in the digital twin (thesis, appendices E.1, F.1).
 
 The scripted teacher drives whenever the young expert would err; only what the teacher drives is learned. Training
-ends when the expert alone passes all drives of its curriculum. The experts that come with the project were made by
-this command with its defaults.
+ends when the expert alone passes all drives of its curriculum; those of the line, each lap of which is driven anew, on
+other layouts and from other starts, some laps in a row that they were not taught on. One that is not proven within its
+laps is not saved.
 
 tasks: line (line-obstacles, race, eight-obstacles), eight, passage, garden, corridor, table-top. The lidar expert of
 the eight is the line's, that of the corridor the garden's; table-top has a depth expert, and both others of the line.
@@ -19,7 +20,7 @@ import os
 from pathlib import Path
 
 from lira.fusion.experts.tasks import DEFAULT, TASKS
-from lira.hal.errors import ConfigError, LiraError, StorageError
+from lira.hal.errors import ConfigError, StorageError
 from lira.tools.options import add_seed
 
 
@@ -35,7 +36,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Train, measure the cruise action, save. Exit status 1 if the expert did not pass its curriculum."""
+    """Train until it is proven, measure the cruise action, save."""
     from lira.fusion.experts.files import shipped_path
     from lira.hal.profile import load_profile
     from lira.tools.runs.expert_training import command, train_expert
@@ -53,7 +54,5 @@ def run(args: argparse.Namespace) -> int:
     if not os.access(path.parent, os.W_OK):
         raise StorageError(f"cannot write {path}: the folder may not be written", "Choose another folder.")
     how = command(args.expert, args.task, profile, args.seed)
-    passed = train_expert(args.expert, args.task, profile, args.seed, path, how)
-    if not passed:
-        raise LiraError("the expert did not pass its curriculum; nothing was saved", "Try another --seed.")
+    train_expert(args.expert, args.task, profile, args.seed, path, how)
     return 0
