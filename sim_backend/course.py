@@ -60,6 +60,25 @@ class Obstacles:
         nearest: Floats = (outside + np.minimum(np.maximum(along, across), 0.0)).min(-1)
         return nearest
 
+    def straight_ahead(self, x_m: Floats, y_m: Floats, yaw_rad: Floats) -> Floats:
+        """Metres from each place [...] to where a straight drive first meets a box: 0 inside, +inf if it meets none."""
+        if not len(self.x_m):
+            return np.full(x_m.shape, np.inf)
+        off_x, off_y = x_m[..., None] - self.x_m, y_m[..., None] - self.y_m
+        cos, sin = np.cos(yaw_rad)[..., None], np.sin(yaw_rad)[..., None]
+        enters, leaves = np.asarray(-np.inf), np.asarray(np.inf)
+        with np.errstate(divide="ignore", invalid="ignore"):  # parallel to a side
+            for at, along, half in (
+                (self.cos * off_x + self.sin * off_y, self.cos * cos + self.sin * sin, self.half_length_m),
+                (self.cos * off_y - self.sin * off_x, self.cos * sin - self.sin * cos, self.half_width_m),
+            ):
+                one, other = (-half - at) / along, (half - at) / along
+                enters = np.fmax(enters, np.fmin(one, other))
+                leaves = np.fmin(leaves, np.fmax(one, other))
+        met = (enters <= leaves) & (leaves >= 0.0)
+        nearest: Floats = np.where(met, np.maximum(enters, 0.0), np.inf).min(-1)
+        return nearest
+
     def distance_one(self, x_m: float, y_m: float) -> float:
         """Distance of one place: the same to the bit as `distance`, and sooner."""
         if not len(self.x_m):

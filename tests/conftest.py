@@ -21,6 +21,8 @@ from hypothesis import settings
 from kinds import TAKES_LONG, kind_of
 from loopback import take_own_loopback
 
+# The tests share the processors, and small matrices multiply no faster on several threads, which wait for each other.
+os.environ.setdefault("OMP_NUM_THREADS", "1")
 # A shell that runs the suite in the background ignores SIGINT, and so would every process that a test starts.
 signal.signal(signal.SIGINT, signal.default_int_handler)
 
@@ -102,6 +104,14 @@ def lock_files_of_their_own(tmp_path_factory: pytest.TempPathFactory) -> Iterato
         folder = str(tmp_path_factory.mktemp("locks"))
         patch.setenv("TMPDIR", folder)
         patch.setattr(tempfile, "tempdir", folder)
+        yield
+
+
+@pytest.fixture(autouse=True, scope="session")
+def as_nice_as_it_began() -> Iterator[None]:
+    """A verb that gives way to others does not do so for the tests that come after it in this process."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(os, "nice", lambda _: 0)
         yield
 
 

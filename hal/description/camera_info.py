@@ -8,9 +8,6 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from ruamel.yaml import YAML
-from ruamel.yaml.error import YAMLError
-
 from lira.hal.config import read_bounded
 from lira.hal.errors import ConfigError
 from lira.hal.messages import CameraInfo
@@ -53,6 +50,9 @@ def _resized(matrix: tuple[float, ...], columns: int, scales: tuple[float, float
 
 def load_calibration(path: Path, camera: Camera) -> CameraInfo:
     """Read a calibration, for pictures of the profile's size. Raises `ConfigError`."""
+    from ruamel.yaml import YAML  # few have a file, and every start would pay for it
+    from ruamel.yaml.error import YAMLError
+
     try:
         said = YAML(typ="safe", pure=True).load(read_bounded(path, LONGEST_BYTES))
         return info_for(_read(said), (camera.width_px, camera.height_px), 0.0)

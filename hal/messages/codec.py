@@ -10,11 +10,19 @@ import msgspec
 from rosbags.serde import SerdeError
 
 from lira.hal.errors import CodecError
+from lira.hal.messages import ros_description as description
+from lira.hal.messages import ros_learning as learning
+from lira.hal.messages import ros_motion as motion
+from lira.hal.messages import ros_operation as operation
+from lira.hal.messages import ros_sensing as sensing
 from lira.hal.messages.bounds import check
-from lira.hal.messages.ros_table import CODECS, TYPES
+from lira.hal.messages.ros_types import TYPES, Codec
 
 M = TypeVar("M")
 PADDED_BYTES = 16
+
+# How each message becomes a ROS message, and back.
+CODECS: dict[type, Codec] = motion.CODECS | sensing.CODECS | operation.CODECS | learning.CODECS | description.CODECS
 
 # rosbags raises its own error for what it checks and these for what it does not; a value that no enum or array
 # shape takes ends in the same family.

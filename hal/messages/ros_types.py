@@ -1,15 +1,21 @@
-"""The types: those of ROS 2 Jazzy and our own in `hal/msg` (package `lira_msgs`), and what most messages share."""
+"""The types: those of ROS 2 that we speak (`jazzy.msg`), our own in `msg/` (package `lira_msgs`), and what most share.
+
+All of ROS 2 Jazzy's, which others may send, are loaded when somebody asks for one: that takes as long as the rest of a
+start.
+"""
 
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cache
 from importlib import resources
 from typing import Any
 
-from rosbags.typesys import Stores, get_types_from_msg, get_typestore
+from rosbags.typesys import Stores, get_typestore
 from rosbags.typesys.store import Typestore
 
 from lira.hal.messages import Twist
+from lira.hal.messages.msg_text import Definitions, read, read_all
 
 PACKAGE = "lira_msgs"
 
@@ -23,22 +29,50 @@ class Codec:
     from_ros: Callable[[Any], Any]
 
 
-def _load_types() -> Typestore:
-    store = get_typestore(Stores.ROS2_JAZZY)
+def _own() -> Definitions:
+    definitions: Definitions = {}
     for entry in sorted((resources.files("lira.hal.messages") / "msg").iterdir(), key=lambda entry: entry.name):
         if entry.name.endswith(".msg"):
             name = f"{PACKAGE}/msg/{entry.name.removesuffix('.msg')}"
-            store.register(get_types_from_msg(entry.read_text(encoding="utf-8"), name))
+            definitions |= read(entry.read_text(encoding="utf-8"), name)
+    return definitions
+
+
+def _spoken() -> Definitions:
+    return read_all((resources.files("lira.hal.messages") / "jazzy.msg").read_text(encoding="utf-8"))
+
+
+def _load_types() -> Typestore:
+    store = get_typestore(Stores.EMPTY)
+    store.register(_spoken() | _own())
     return store
 
 
 TYPES = _load_types()
 
 
+@cache
+def all_types() -> Typestore:
+    """All types of ROS 2 Jazzy, and our own."""
+    store = get_typestore(Stores.ROS2_JAZZY)
+    store.register(_own())
+    return store
+
+
+def types_with(ros_type: str) -> Typestore | None:
+    """Return types among which this one is, by a name such as `sensor_msgs/msg/Image`; None if nobody here knows it."""
+    if ros_type in TYPES.types:
+        return TYPES
+    return all_types() if ros_type in all_types().types else None
+
+
 def definition(ros_type: str) -> str:
-    """Text of a message definition with all it refers to, as MCAP's schema encoding `ros2msg` wants it."""
-    text, _ = TYPES.generate_msgdef(ros_type, ros_version=2)
-    return text
+    """Text of a message definition with all it refers to, as MCAP's schema encoding `ros2msg` wants it.
+
+    Empty for a type that nobody here knows.
+    """
+    types = types_with(ros_type)
+    return "" if types is None else types.generate_msgdef(ros_type, ros_version=2)[0]
 
 
 def ros(name: str) -> Callable[..., Any]:

@@ -6,7 +6,7 @@ from typing import Any
 from rosbags.interfaces import Nodetype
 from rosbags.typesys.store import Typestore
 
-from lira.hal.messages.ros_types import TYPES
+from lira.hal.messages.ros_types import types_with
 
 
 @cache
@@ -15,8 +15,11 @@ def type_hash(ros_type: str) -> str:
 
     rosidl takes `char` for `uint8` before it hashes; rosbags does not.
     """
+    types = types_with(ros_type)
+    if types is None:
+        raise KeyError(ros_type)
     store = Typestore()
-    for name, (constants, fields) in TYPES.fielddefs.items():
+    for name, (constants, fields) in types.fielddefs.items():
         store.fielddefs[name] = constants, _plain(fields)
     return str(store.hash_rihs01(ros_type))
 

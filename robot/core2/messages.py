@@ -2,18 +2,20 @@
 
 import math
 import struct
+from importlib import resources
 from typing import Any
 
 from rosbags.serde import SerdeError
-from rosbags.typesys import Stores, get_types_from_msg, get_typestore
+from rosbags.typesys import Stores, get_typestore
 from rosbags.typesys.store import Typestore
 
 from lira.hal.errors import SensorError
 from lira.hal.messages import BatteryState, Imu, Range, Twist
+from lira.hal.messages.msg_text import read_all
 from lira.robot.core2.wheels import Pose
 
 # Before Noetic the battery's message had no temperatures.
-_OLD_BATTERY = """Header header
+OLD_BATTERY = """Header header
 float32 voltage
 float32 current
 float32 charge
@@ -35,8 +37,8 @@ CONFIG_ANSWER_MD5 = "d26ad64e1f52355ee24245b602a171ba"
 
 
 def _load_types() -> Typestore:
-    store = get_typestore(Stores.ROS1_NOETIC)
-    store.register(get_types_from_msg(_OLD_BATTERY, OLD_BATTERY))
+    store = get_typestore(Stores.EMPTY)
+    store.register(read_all((resources.files("lira.robot.core2") / "noetic.msg").read_text(encoding="utf-8")))
     return store
 
 

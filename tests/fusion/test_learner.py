@@ -68,7 +68,9 @@ def test_experts_learn_from_their_own_sensor(network, k):
 
 @pytest.mark.parametrize("frozen", [False, True])
 def test_one_seed_gives_one_result(frozen):
-    first, second, other = (trained(fusion_net(*SIZES), frozen=frozen, seed=seed).weights() for seed in (1, 1, 2))
+    first, second, other = (
+        trained(fusion_net(*SIZES), frozen=frozen, seed=seed, updates=8).weights() for seed in (1, 1, 2)
+    )
     for name in first:
         np.testing.assert_array_equal(first[name], second[name])
     assert not np.array_equal(first["fc1.weight"], other["fc1.weight"])
@@ -109,9 +111,9 @@ def test_frozen_trunks_stay_and_training_the_head_on_kept_features_equals_the_fu
 def test_full_training_stays_close_to_plain_float32(monkeypatch):
     """Half-precision convolutions, where the processor has them, change little."""
     made, fresh = labels(60), labels(50, seed=9)
-    fast = trained(fusion_net(*SIZES), made=made, steps=3).weights()
+    fast = trained(fusion_net(*SIZES), made=made, steps=3, updates=25).weights()
     monkeypatch.setattr("lira.fusion.learning.learner._has_bfloat16", lambda: False)
-    exact = trained(fusion_net(*SIZES), made=made, steps=3).weights()
+    exact = trained(fusion_net(*SIZES), made=made, steps=3, updates=25).weights()
     networks = fusion_net(*SIZES), fusion_net(*SIZES)
     for network, weights in zip(networks, (fast, exact), strict=True):
         network.load_weights(weights)

@@ -169,7 +169,7 @@ OWN = """
         tables=lambda outcomes: [Table("What it took", method_rows(outcomes, label_row))],
         findings=lambda outcomes: [],
         methods=("mine",),
-        words="ten metres of line",
+        words="eight metres of line",
     )
 """
 

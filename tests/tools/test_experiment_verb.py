@@ -14,7 +14,7 @@ from lira.tools.verbs.learn import experiment as verb
 
 @pytest.fixture
 def short_race(monkeypatch, tmp_path):
-    """`race` on a world of ten metres, and no other experiment."""
+    """`race` on a world of eight metres, and no other experiment."""
     world = write_world(tmp_path)
 
     def trials(seeds):

@@ -18,8 +18,8 @@ from lira.hal.bus.sensors import Stamped, observation_of
 from lira.hal.errors import ConfigError, SensorError, StorageError
 from lira.hal.messages import Applied, CompressedImage, Image, LaserScan, Source, Twist, TwistStamped
 from lira.hal.messages.bounds import check
-from lira.hal.messages.codec import ros_type_of
-from lira.hal.messages.ros_table import CODECS, TYPES
+from lira.hal.messages.codec import CODECS, ros_type_of
+from lira.hal.messages.ros_types import all_types
 from lira.hal.profile import RobotProfile
 from lira.tools.export.demonstrations import Shown
 
@@ -56,7 +56,7 @@ def read_bag(path: Path, profile: RobotProfile, topics: Mapping[str, str]) -> It
     if path.is_dir() and not (path / METADATA).exists():
         raise StorageError(f"{path} is neither a bag nor a LeRobot data set", REMEDY)
     try:
-        with AnyReader([path], default_typestore=TYPES) as bag:
+        with AnyReader([path], default_typestore=all_types()) as bag:
             chosen = choose({each.topic: each.msgtype for each in bag.connections}, topics)
             yield from shown_by(_values(bag, {each.topic: each for each in chosen}), profile)
     except (AnyReaderError, OSError) as error:

@@ -7,7 +7,7 @@ from typing import Any
 
 import msgspec
 
-from lira.hal.messages.ros_types import TYPES
+from lira.hal.messages.ros_types import types_with
 from lira.tools.recording.layout import BAG, ENCODING, Head
 
 VERSION = 9
@@ -98,13 +98,14 @@ def write_bag(folder: Path, files: Sequence[BagFile], head: Head) -> None:
 
 
 def _topic(name: str, ros_type: str, latched: bool, count: int) -> dict[str, Any]:
+    types = types_with(ros_type)
     return {
         "topic_metadata": {
             "name": name,
             "type": ros_type,
             "serialization_format": ENCODING,
             "offered_qos_profiles": qos_of(latched=latched),
-            "type_description_hash": TYPES.hash_rihs01(ros_type) if ros_type in TYPES.types else "",
+            "type_description_hash": types.hash_rihs01(ros_type) if types is not None else "",
         },
         "message_count": count,
     }

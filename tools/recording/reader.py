@@ -26,7 +26,7 @@ from lira.hal.bus.attachment import Attachment, parse_attachment
 from lira.hal.bus.topics import BY, TOPICS, Topic, named
 from lira.hal.errors import CodecError, StorageError
 from lira.hal.messages.codec import decode
-from lira.hal.messages.ros_types import TYPES
+from lira.hal.messages.ros_types import types_with
 from lira.tools.recording.layout import ATTACHMENT_KEY, HEAD, INFO, LOSSES, Head, files_of, head_from
 from lira.tools.recording.writer import attachment_from_cdr
 
@@ -60,9 +60,10 @@ class Recorded:
         topic = topic_of(self.key)
         if topic is not None and topic.ros_type == self.ros_type:
             return decode(topic.kind, self.payload)
-        if self.ros_type not in TYPES.types:
+        types = types_with(self.ros_type)
+        if types is None:
             raise CodecError(f"nobody here knows what a {self.ros_type or 'message without a type'} is")
-        return TYPES.deserialize_cdr(self.payload, self.ros_type)
+        return types.deserialize_cdr(self.payload, self.ros_type)
 
     @cached_property
     def attachment(self) -> Attachment | None:

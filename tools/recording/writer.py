@@ -12,7 +12,7 @@ from mcap.writer import CompressionType, Writer
 from lira.hal.bus.reader import RawSample
 from lira.hal.bus.topics import LATCHED_KEYS
 from lira.hal.errors import StorageError
-from lira.hal.messages.ros_types import TYPES, definition
+from lira.hal.messages.ros_types import definition
 from lira.tools.recording.bag import BagFile, qos_text, write_bag
 from lira.tools.recording.layout import (
     ATTACHMENT_KEY,
@@ -125,8 +125,7 @@ class RecordingWriter:
         schema = self._schemas.get(ros_type)
         if schema is None:
             # Of what nobody here knows only the name is kept.
-            text = definition(ros_type).encode() if ros_type in TYPES.types else b""
-            schema = self._writer.register_schema(ros_type, SCHEMA_ENCODING, text)
+            schema = self._writer.register_schema(ros_type, SCHEMA_ENCODING, definition(ros_type).encode())
             self._schemas[ros_type] = schema
         about = {"offered_qos_profiles": qos_text(latched=key in LATCHED_KEYS)}
         channel = self._writer.register_channel(topic, ENCODING, schema, about)
