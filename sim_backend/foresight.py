@@ -139,17 +139,11 @@ class Foresight:
             return linear_m_s
         half_m = base.width_m / 2 + field.margin_m
         cos, sin = np.cos(motion.yaw_rad), np.sin(motion.yaw_rad)
-        sides = [side * half_m for side in (-1.0, 0.0, 1.0)]
-        free_m = (
-            np.min(
-                [
-                    near.straight_ahead(motion.x_m - side * sin, motion.y_m + side * cos, motion.yaw_rad)
-                    for side in sides
-                ],
-                axis=0,
-            )
-            - base.length_m / 2
-        )
+        met_m = [
+            near.straight_ahead(motion.x_m - side_m * sin, motion.y_m + side_m * cos, motion.yaw_rad)
+            for side_m in (-half_m, 0.0, half_m)
+        ]
+        free_m = np.min(met_m, axis=0) - base.length_m / 2
         slowed = np.where(free_m < field.slow_m, np.minimum(linear_m_s, field.slow_m_s), linear_m_s)
         return np.where(free_m < field.stop_m, 0.0, slowed)
 

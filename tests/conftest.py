@@ -109,7 +109,7 @@ def lock_files_of_their_own(tmp_path_factory: pytest.TempPathFactory) -> Iterato
 
 @pytest.fixture(autouse=True, scope="session")
 def as_nice_as_it_began() -> Iterator[None]:
-    """A verb that gives way to others must not do so for the process of the tests: all that come after it would wait."""
+    """A verb that gives way to others does not do so for the tests that come after it in this process."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(os, "nice", lambda _: 0)
         yield

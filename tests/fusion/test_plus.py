@@ -118,7 +118,6 @@ class TestPrefill:
         assert proposal.choice.driver != "camera"
         assert len(scene.shelf.labels) == 8
 
-
     def disagreeing(self, *, trained=True):
         scene = Scene(PlusSettings(prefill=60, reserve_s=0.0), trained=trained)
         scene.warm()

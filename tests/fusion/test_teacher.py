@@ -314,6 +314,19 @@ def test_a_robot_that_strays_from_a_free_line_turns_back_or_stands_is_in_need_of
     assert (action is not None) == takes
 
 
+@pytest.mark.parametrize(("yaw_rad", "takes"), [(1.5, False), (2.1, True)])
+def test_a_slow_robot_that_turns_back_is_in_need_of_help_although_it_does_not_get_far(yaw_rad, takes):
+    slow = load_profile("rosbot2")
+    foresight = Foresight(slow, WORLD)
+    hand = ScriptedTeacher(foresight, slow, PERFECT, seed=0)
+    hand.reset(0)
+    twin = Twin(slow, WORLD)
+    twin.reset(Episode(start_m=1.0, lateral_m=-0.3, yaw_rad=yaw_rad))
+    action = hand.act(twin.state(), QUIET, lambda _: (1.0, 0.0))
+    foresight.close()
+    assert (action is not None) == takes
+
+
 @pytest.mark.parametrize("settings", [PERFECT, SKILLED])
 def test_in_the_twin_it_takes_over_before_the_box_drives_around_it_and_hands_back(settings):
     foresight = Foresight(PROFILE, WORLD)

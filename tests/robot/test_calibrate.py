@@ -104,13 +104,13 @@ def devices(folder, room):
 
 
 def calibrated(words, room, capsys):
-    """Calibrate; returns what it says. On a busy machine a scan may come late: then it stops, and is begun again."""
+    """Calibrate; returns what it says. On a busy machine sensors may be late: then it stops, and is begun again."""
     for _ in range(4):
         room.put_back()
         if main(words) == 0:
             return capsys.readouterr().out
         error = capsys.readouterr().err
-        assert "the robot stopped" in error
+        assert "the robot stopped" in error or "no longer tells where it is" in error
     raise AssertionError(error)
 
 
@@ -133,15 +133,19 @@ def test_with_a_lidar_a_ten_percent_error_is_found_by_itself_and_written(tmp_pat
 
 
 def test_with_a_tape_the_person_says_what_was_measured(tmp_path, capsys, monkeypatch):
-    answers = iter(["y", "far", "0,33"])
-    asked = []
+    asked, measured = [], iter(["far", "0,33"])
+
+    def answer(question):
+        asked.append(question)
+        return "y" if "power switch" in question else next(measured)
+
+    room = Room(far=1.1)
     monkeypatch.setattr("sys.stdin.isatty", lambda: True, raising=False)
-    monkeypatch.setattr("builtins.input", lambda question: asked.append(question) or next(answers))
-    with devices(tmp_path, Room(far=1.1)) as (words, *_):
-        words = [*words, *NO_FIELD, "--only", "distance", "--distance", "0.3"]  # noqa: PLW2901
-        assert main(words) == 0, capsys.readouterr().err
+    monkeypatch.setattr("builtins.input", answer)
+    with devices(tmp_path, room) as (words, *_):
+        out = calibrated([*words, *NO_FIELD, "--only", "distance", "--distance", "0.3"], room, capsys)
     assert "power switch" in asked[0]
-    reported_m = float(re.search(r"reported (\S+) m", capsys.readouterr().out)[1])
+    reported_m = float(re.search(r"reported (\S+) m", out)[1])
     assert load_settings(tmp_path / "mine.toml").base.distance_scale == pytest.approx(0.33 / reported_m, abs=0.002)
 
 

@@ -95,6 +95,29 @@ def test_distance_to_a_turned_box():
     assert obstacles.distance(points) == pytest.approx([2.0, 1.5, 5.0, -0.5])
 
 
+@pytest.mark.parametrize("seed", range(3))
+def test_straight_ahead_a_box_is_met_where_a_drive_in_small_steps_first_is_inside(seed):
+    random, step_m = np.random.default_rng(seed), 0.005
+    rows = random.uniform((-3.0, -3.0, -3.2, 0.2, 0.2), (3.0, 3.0, 3.2, 2.0, 2.0), (4, 5)).tolist()
+    obstacles = Obstacles.of(tuple(Block(x, y, yaw, length, width, 0.5, 0) for x, y, yaw, length, width in rows))
+    x_m, y_m, yaw_rad = random.uniform(-4.0, 4.0, (3, 300))
+    yaw_rad[:8] = np.arange(8) * math.pi / 4
+    along_m = np.arange(0.0, 12.0, step_m)
+    steps = along_m[:, None] * np.array([np.cos(yaw_rad), np.sin(yaw_rad)])[:, None]
+    inside = obstacles.distance(np.stack([x_m + steps[0], y_m + steps[1]], axis=-1)) < 0.0
+    driven_m = np.where(inside.any(axis=0), along_m[inside.argmax(axis=0)], np.inf)
+    met_m = obstacles.straight_ahead(x_m, y_m, yaw_rad)
+    grazed = np.isinf(driven_m) & np.isfinite(met_m)  # over a corner, within one step
+    assert np.count_nonzero(grazed) <= 3
+    assert 20 < np.count_nonzero(np.isfinite(driven_m)) < 280
+    assert met_m[~grazed] == pytest.approx(driven_m[~grazed], abs=1.01 * step_m)
+    assert (met_m[driven_m == 0.0] == 0.0).all()
+
+
+def test_without_boxes_nothing_is_straight_ahead():
+    assert Obstacles.of(()).straight_ahead(*np.zeros((3, 2))).tolist() == [math.inf] * 2
+
+
 def test_without_boxes_the_clearance_is_infinite():
     course = Course(build(load_world("eight")), 0.15)
     assert course.clearance(np.zeros((3, 2))).tolist() == [math.inf] * 3

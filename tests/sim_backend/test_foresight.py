@@ -6,15 +6,18 @@ import sys
 import numpy as np
 import pytest
 
+from lira.fusion.control import to_twist
 from lira.fusion.experts.load import load_policy
 from lira.fusion.modalities.image import gray_image
 from lira.fusion.preprocess import Preprocessor
-from lira.hal.messages import Episode
+from lira.hal.messages import STOP, Command, Episode
 from lira.hal.profile import load_profile
+from lira.hal.safety.governed import govern
 from lira.sim_backend.camera import PinholeCamera
 from lira.sim_backend.foresight import Foresight, with_small_camera
 from lira.sim_backend.lidar import RayLidar
 from lira.sim_backend.twin import Twin
+from lira.sim_backend.world import Box, Limits, Line, Piece, World
 
 
 @pytest.mark.parametrize("world", ["corridor", "garden"])
@@ -36,6 +39,34 @@ def test_a_small_picture_looks_like_the_one_it_stands_for(world):
 def test_a_camera_that_is_small_already_is_left_alone():
     profile = load_profile("thesis-sim")
     assert with_small_camera(profile) is profile
+
+
+@pytest.mark.parametrize(("aside_m", "turn"), [(0.0, 0.0), (0.0, 0.3), (0.12, 0.0), (0.5, 0.0)])
+def test_the_protective_field_works_in_what_is_foreseen_as_on_the_robot(aside_m, turn):
+    profile, steps = load_profile("rosbot2"), 10
+    world = World(
+        description="a box on the way",
+        box=(Box(x_m=1.0, y_m=0.0, length_m=0.4, width_m=0.2),),
+        line=Line(pieces=(Piece(straight_m=5.0),)),
+        limits=Limits(lost_m=3.0, finish_m=4.0),
+    )
+    foresight = Foresight(profile, world)
+    with govern(Twin(profile, world)) as robot:
+        robot._robot.reset(Episode(start_m=0.35, lateral_m=aside_m))
+        began, period_s = robot._robot.state(), profile.period_s
+        robot.read()
+        robot.drive(Command(STOP, robot.now()))
+        driven = []
+        for _ in range(steps):
+            robot.read()
+            robot.drive(Command(to_twist((1.0, turn), profile.base), robot.now()))
+            robot.wait(robot.now() + period_s)
+            driven.append(robot._robot.state().x_m)
+    imagined = foresight.imagine(began, np.tile((1.0, turn), (1, steps, 1)), period_s)
+    foreseen = foresight.rollout(began, lambda _: (1.0, turn), steps, period_s)
+    assert imagined.x_m[0] == pytest.approx(driven, abs=0.03)  # it looks ten times a second, not fifty
+    assert [state.x_m for state in foreseen] == pytest.approx(driven, abs=0.05)
+    foresight.close()
 
 
 @pytest.mark.parametrize("turn", [-0.6, 0.0, 0.6])

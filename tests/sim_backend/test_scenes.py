@@ -43,7 +43,7 @@ def places(layout: Layout, count: int, seed: int) -> list[Pose]:
     return poses
 
 
-@pytest.fixture(params=[(world, layout) for world in known_worlds() for layout in LAYOUTS], ids=str)
+@pytest.fixture(scope="module", params=[(world, layout) for world in known_worlds() for layout in LAYOUTS], ids=str)
 def pair(request):
     world, number = request.param
     layout = build(load_world(world), number)
