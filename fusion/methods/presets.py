@@ -176,6 +176,7 @@ PLUS = (
     _plus("plus"),
     _plus("plus-no-prefill", approach=PlusSettings(prefill=0)),
     _plus("plus-no-reserve", approach=PlusSettings(reserve_s=0.0)),
+    _plus("plus-no-shown", approach=PlusSettings(shown=False)),
     _plus("plus-no-sure", approach=PlusSettings(sure=None)),
     _plus("plus-no-weight", learning=_M10),
     _plus("plus-no-mirror", mirrored=False),
