@@ -119,7 +119,8 @@ def remote(robot: Served) -> Iterator[RemoteRobot]:
             client.close()
 
 
-def wait_for(condition: Callable[[], bool], timeout_s: float = 5.0) -> None:
+def wait_for(condition: Callable[[], bool], timeout_s: float = 20.0) -> None:
+    """For what is certain to come: only what hangs takes that long."""
     deadline_s = time.monotonic() + timeout_s
     while not condition():
         assert time.monotonic() < deadline_s, "never happened"
