@@ -6,11 +6,10 @@ from types import SimpleNamespace
 
 import pytest
 import zenoh
-from wiring import PROFILE, joined, new_endpoint, new_name, ready, real_time_null, remote, served, wait_for
+from wiring import PROFILE, joined, paired, ready, real_time_null, remote, served, wait_for
 
 from lira.hal.bus.attachment import Attachment
 from lira.hal.bus.boundary import Boundary
-from lira.hal.bus.bus import Bus
 from lira.hal.bus.questions import QUESTIONS
 from lira.hal.bus.reader import Reader
 from lira.hal.bus.topics import CMD_VEL, ESTOP, INFO, JOY
@@ -43,11 +42,8 @@ def test_who_sends_under_many_sessions_fills_nothing():
 
 @pytest.fixture
 def pair():
-    name, endpoint = new_name(), new_endpoint()
-    robot, client = Bus(name, listen=endpoint), Bus(name, connect=endpoint)
-    yield robot, client
-    assert client.close()
-    assert robot.close()
+    with paired() as buses:
+        yield buses
 
 
 def put(client, topic, payload, attachment=None):

@@ -32,6 +32,7 @@ from lira.sim_backend.emulators.wire import Wire
 
 LIDAR = load_profile("rosbot2").lidar
 SETTINGS = LidarSettings(spin_up_s=0.0)
+LAST_WORDS_S = 1.0  # that a driver is done says not that all is through the wire
 
 
 def room(theta_rad):
@@ -58,7 +59,9 @@ class Bench:
 
     def __exit__(self, *_):
         self.supervisor.close()
-        time.sleep(0.05)  # the last words are still on the wire
+        until_s = time.monotonic() + LAST_WORDS_S
+        while (self.unit.scanning or self.unit.pwm) and time.monotonic() < until_s:
+            time.sleep(0.01)
         self.wire.close()
 
     def wait_scans(self, count, timeout_s=20.0):
