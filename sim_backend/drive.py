@@ -6,6 +6,7 @@
 """
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import cast
 
@@ -35,6 +36,11 @@ class Motion:
         """Position [..., 2]."""
         return np.stack([self.x_m, self.y_m], axis=-1)
 
+    @property
+    def arrays(self) -> tuple[Floats, Floats, Floats, Floats, Floats]:
+        """All five."""
+        return self.x_m, self.y_m, self.yaw_rad, self.linear_m_s, self.angular_rad_s
+
 
 def motion(x_m: float, y_m: float, yaw_rad: float, linear_m_s: float = 0.0, angular_rad_s: float = 0.0) -> Motion:
     """Make the motion of a single robot, arrays of shape []."""
@@ -55,6 +61,35 @@ def step(base: Base, now: Motion, linear_m_s: Floats, angular_rad_s: Floats, dur
         linear, angular = ramp_wheels(base, now, linear_m_s, angular_rad_s, duration_s / count)
         now = glide(now, linear, angular, duration_s / count)
     return now
+
+
+def path(base: Base, now: Motion, linear_m_s: Floats, angular_rad_s: Floats, duration_s: float) -> Motion:
+    """Where robots [N] are after each of K target velocities [N, K], each held so long: arrays [N, K].
+
+    The same to the bit as `step` after `step`: sums are added up in the same order.
+    """
+    if base.drive == "kinematic":
+        half_turn = angular_rad_s * duration_s / 2
+        chord = linear_m_s * duration_s * chord_of_arc(half_turn)
+        yaw = _sums(now.yaw_rad, 2 * half_turn)
+        ahead = yaw[:, :-1] + half_turn
+        x, y = _sums(now.x_m, chord * np.cos(ahead)), _sums(now.y_m, chord * np.sin(ahead))
+        return Motion(x[:, 1:], y[:, 1:], yaw[:, 1:], linear_m_s, angular_rad_s)
+    moments = []
+    for linear, angular in zip(linear_m_s.T, angular_rad_s.T, strict=True):
+        now = step(base, now, linear, angular, duration_s)
+        moments.append(now)
+    return in_time(moments)
+
+
+def in_time(moments: Sequence[Motion]) -> Motion:
+    """Moments of some robots [N] as arrays [N, K]."""
+    return Motion(*(np.stack(values, axis=-1) for values in zip(*(each.arrays for each in moments), strict=True)))
+
+
+def _sums(begin: Floats, terms: Floats) -> Floats:
+    """Running sums [N, K + 1] of terms [N, K], from what each begins with [N]."""
+    return np.add.accumulate(np.concatenate([begin[:, None], terms], axis=1), axis=1)
 
 
 def ramp_wheels(
@@ -87,7 +122,7 @@ def glide(now: Motion, linear_m_s: Floats, angular_rad_s: Floats, duration_s: fl
 
 def chord_of_arc(half_turn_rad: Floats) -> Floats:
     """How long the chord is of an arc of length 1: sin(x) / x of half its angle, 1 where it is straight."""
-    one = np.ndim(half_turn_rad) == 0
+    one = half_turn_rad.ndim == 0
     angle = half_turn_rad or TINY_RAD if one else np.where(half_turn_rad == 0.0, TINY_RAD, half_turn_rad)
     share: Floats = np.sin(angle) / angle
     return share

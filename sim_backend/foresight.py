@@ -101,28 +101,36 @@ class Foresight:
         near = self.course.obstacles.near(state.x_m, state.y_m, base.max_linear_m_s * period_s * horizon + CARE_M)
         targets = np.clip(actions, -1.0, 1.0) * np.array([base.max_linear_m_s, base.max_angular_rad_s])
         looks = max(round(period_s / LOOK_PERIOD_S), 1)
-        motion = spread(state, count)
-        place = Place(*np.full((3, count), np.nan))
-        if self.course.has_line:
-            place = self.course.place(motion.xy, motion.yaw_rad, state.progress_m)
-        seen, columns = [], []
-        for t in range(horizon):
-            for _ in range(looks):
-                linear = self._allowed(near, motion, targets[:, t, 0])
-                motion = drive.step(base, motion, linear, targets[:, t, 1], period_s / looks)
-                seen.append(motion.xy)
-            if self.course.has_line:
-                place = self.course.place(motion.xy, motion.yaw_rad, place.progress_m)
-            columns.append(
-                (
-                    *(motion.x_m, motion.y_m, motion.yaw_rad),
-                    *(place.lateral_m, place.progress_m, place.heading_error_rad),
-                )
-            )
-        x, y, yaw, lateral, progress, error = (np.stack(column, axis=-1) for column in zip(*columns, strict=True))
-        distance = near.distance(np.stack(seen, axis=1))
+        begin = spread(state, count)
+        motion = self._follow(near, begin, np.repeat(targets, looks, axis=1), period_s / looks)
+        there = drive.Motion(*(values[:, looks - 1 :: looks] for values in motion.arrays))
+        place = self._places(begin, there, state.progress_m)
+        distance = near.distance(motion.xy)
         clearance = distance.reshape(count, horizon, looks).min(-1) - self.course.radius_m
-        return Imagined(x, y, yaw, clearance, lateral, progress, error)
+        relative = place.lateral_m, place.progress_m, place.heading_error_rad
+        return Imagined(there.x_m, there.y_m, there.yaw_rad, clearance, *relative)
+
+    def _follow(self, near: Obstacles, motion: Motion, targets: Floats, duration_s: float) -> Motion:
+        """Drive robots [N] at velocities [N, K, 2], each held so long: arrays [N, K]."""
+        base = self._profile.base
+        if self._profile.field is None:
+            return drive.path(base, motion, targets[:, :, 0], targets[:, :, 1], duration_s)
+        moments = []
+        for linear, angular in targets.transpose(1, 2, 0):
+            motion = drive.step(base, motion, self._allowed(near, motion, linear), angular, duration_s)
+            moments.append(motion)
+        return drive.in_time(moments)
+
+    def _places(self, begin: Motion, there: Motion, progress_m: float) -> Place:
+        """Where robots are relative to the line [N, T], looked up each near where it was before; nan without a line."""
+        if not self.course.has_line:
+            return Place(*np.full((3, *there.x_m.shape), np.nan))
+        place = self.course.place(begin.xy, begin.yaw_rad, progress_m)
+        places = []
+        for xy, yaw_rad in zip(there.xy.swapaxes(0, 1), there.yaw_rad.T, strict=True):
+            place = self.course.place(xy, yaw_rad, place.progress_m)
+            places.append((place.progress_m, place.lateral_m, place.heading_error_rad))
+        return Place(*(np.stack(values, axis=-1) for values in zip(*places, strict=True)))
 
     def _allowed(self, near: Obstacles, motion: Motion, linear_m_s: Floats) -> Floats:
         """The speed ahead that the protective field leaves, as far as three lines straight ahead tell."""
@@ -131,17 +139,11 @@ class Foresight:
             return linear_m_s
         half_m = base.width_m / 2 + field.margin_m
         cos, sin = np.cos(motion.yaw_rad), np.sin(motion.yaw_rad)
-        sides = [side * half_m for side in (-1.0, 0.0, 1.0)]
-        free_m = (
-            np.min(
-                [
-                    near.straight_ahead(motion.x_m - side * sin, motion.y_m + side * cos, motion.yaw_rad)
-                    for side in sides
-                ],
-                axis=0,
-            )
-            - base.length_m / 2
-        )
+        met_m = [
+            near.straight_ahead(motion.x_m - side_m * sin, motion.y_m + side_m * cos, motion.yaw_rad)
+            for side_m in (-half_m, 0.0, half_m)
+        ]
+        free_m = np.min(met_m, axis=0) - base.length_m / 2
         slowed = np.where(free_m < field.slow_m, np.minimum(linear_m_s, field.slow_m_s), linear_m_s)
         return np.where(free_m < field.stop_m, 0.0, slowed)
 

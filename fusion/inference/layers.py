@@ -10,7 +10,6 @@ from lira.hal.messages import FloatArray
 
 SLOPE = np.float32(0.3)  # of the leaky rectifiers
 KERNEL = 3  # a convolution sees 3 x 3 pixels
-ROWS = 7  # that are convolved at a time
 
 
 def leaky_relu(x: FloatArray, scratch: FloatArray) -> FloatArray:
@@ -40,11 +39,12 @@ class Dense:
 
 
 class Convolution:
-    """3 x 3, valid, stride 1: the patches as columns (im2col), and a product of matrices, a few rows at a time.
+    """3 x 3, valid, stride 1: a product of matrices for each column of the kernel, of which the sum is taken.
 
-    A channel is its rows one behind the other, `pitch` values each, however many of them are valid: so the column of
-    one place in the kernel is one piece of memory. Each convolution leaves two values more at the end of a row that
-    belong to no pixel. The columns of a few rows stay in the cache, and leave room there for what others need.
+    A channel is its rows one behind the other, `pitch` values each, however many of them are valid: so what a place in
+    the kernel sees of it is one piece of memory, begun somewhat later. The three places of a column are copied below
+    each other; the next column sees the same, begun one value later. Each convolution leaves two values more at the end
+    of a row that belong to no pixel.
     """
 
     def __init__(self, weight: FloatArray, rows: int, pitch: int) -> None:
@@ -52,21 +52,23 @@ class Convolution:
         filters, channels = weight.shape[:2]
         padded = np.zeros((channels, rows * pitch + KERNEL - 1), np.float32)  # the last pixel's patch ends behind it
         self.input = padded[:, : rows * pitch]
-        self._weight = np.ascontiguousarray(weight).reshape(filters, -1)
-        self._out = np.empty((filters, (rows - KERNEL + 1) * pitch), np.float32)
-        columns = np.empty(self._weight.shape[1] * ROWS * pitch, np.float32)
+        size = (rows - KERNEL + 1) * pitch
         channel, value = padded.strides
-        self._pieces = []
-        for begin in range(0, self._out.shape[1], ROWS * pitch):
-            out = self._out[:, begin : begin + ROWS * pitch]
-            kernel = (channels, KERNEL, KERNEL, out.shape[1])
-            places = (channel, value * pitch, value, value)
-            patches = as_strided(padded[:, begin:], kernel, places, writeable=False)
-            self._pieces.append((patches, columns[: patches.size].reshape(kernel), out))
+        below = (channels, KERNEL, size + KERNEL - 1)
+        self._patches = as_strided(padded, below, (channel, value * pitch, value), writeable=False)
+        self._copied = np.empty(below, np.float32)
+        seen = self._copied.reshape(channels * KERNEL, -1)
+        self._columns = [
+            (np.ascontiguousarray(weight[:, :, :, x]).reshape(filters, -1), seen[:, x : x + size])
+            for x in range(KERNEL)
+        ]
+        self._out, self._part = np.empty((filters, size), np.float32), np.empty((filters, size), np.float32)
 
     def __call__(self) -> FloatArray:
         """Return the output [out, (rows - 2) * pitch] of what is in `input`; the next call writes over it."""
-        for patches, columns, out in self._pieces:
-            np.copyto(columns, patches)
-            np.matmul(self._weight, columns.reshape(self._weight.shape[1], -1), out=out)
+        np.copyto(self._copied, self._patches)
+        (weight, seen), *others = self._columns
+        np.matmul(weight, seen, out=self._out)
+        for weight, seen in others:
+            np.add(self._out, np.matmul(weight, seen, out=self._part), out=self._out)
         return self._out

@@ -10,13 +10,14 @@ from numpy.typing import NDArray
 from torch import Tensor, nn
 
 from lira.fusion.inference.architecture import Weights
+from lira.fusion.inference.networks import DrivingNet
 from lira.fusion.learning.adam import Adam
 from lira.fusion.learning.heads import Heads
 from lira.fusion.learning.label_store import FileRows
 from lira.fusion.learning.labels import Label, mirror
 from lira.fusion.policies.ensemble import EnsembleNet
 from lira.fusion.policies.growing import Rows
-from lira.fusion.policies.networks import Inputs, Network, PictureTrunk, ScanTrunk, batch_of_one
+from lira.fusion.policies.networks import Inputs, Network, PictureTrunk, ScanTrunk
 from lira.fusion.preprocess import MODALITIES
 
 RESIDENT_BYTES = 128 * 2**20  # of inputs in memory; 10,000 labels with frozen trunks, 92,000 without
@@ -120,6 +121,14 @@ class Learner:
         return [each for trunk in trunks for each in trunk.parameters() if each.requires_grad]
 
     @cached_property
+    def _eyes(self) -> DrivingNet:
+        """The same network as it drives: what a driver in this process has just seen its trunks remember."""
+        return self._network.driving()
+
+    def __getstate__(self) -> dict[str, Any]:
+        return {name: value for name, value in self.__dict__.items() if name != "_eyes"}  # it belongs to a process
+
+    @cached_property
     def _adam(self) -> Adam:
         heads = [self._heads.flat, *([self._doubters.flat] if self._members else [])]
         return Adam([*heads, *self._trunks], self._learning_rate)
@@ -136,7 +145,7 @@ class Learner:
     def _keep_in_memory(self, label: Label, kept: dict[str, NDArray[Any]]) -> None:
         rows = kept
         if self._frozen_trunks:
-            rows = {TRUNKS: self._frozen_features(batch_of_one(label.features))[0].numpy()}
+            rows = {TRUNKS: self._eyes.features(label.features)}
         if not self._inputs:
             self._inputs = {name: Rows(row.shape, row.dtype) for name, row in rows.items()}
         for name, store in self._inputs.items():

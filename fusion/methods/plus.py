@@ -6,7 +6,7 @@
 - Reservation: an expert's label counts only once a second has passed without the human correcting what the expert did.
 - A choice as an answer: instead of driving, the human may give control to an expert for a while.
 - Practice: a novice that was once examined drives as it will alone, and is only corrected.
-- Sureness: where the experts disagree and the novice says that it knows, it drives, and nobody is called.
+- Sureness: where an expert would drive or the human would be called, but the novice says that it knows, it drives.
 
 Its novice is that of `fusion/kernel.py`.
 """
@@ -30,9 +30,10 @@ class PlusSettings(MethodSettings, frozen=True, tag="plus"):
 
     lira: LiraSettings = LiraSettings()
     prefill: int = 60  # labels the experts give before the human is asked
+    shown: bool = True  # once the human has driven, the novice drives where they disagree, before that many, too
     reserve_s: float = 1.0  # an expert's label waits so long for the human's objection
     handover_s: float = 1.0  # an expert that was given control keeps it so long
-    sure: float | None = None  # surer than at all but this share of what the human showed, the novice is not helped
+    sure: float | None = 0.5  # surer than at all but this share of what the human showed, the novice is not helped
     practice: bool = False  # from its first proving run on, the novice drives and the human corrects it
     ask: bool = False  # on unseen layouts it stops and asks where it doubts
 
@@ -146,7 +147,8 @@ class LiraPlus(LiraSpf):
         first, a_1 = self.experts[0].name, proposal.experts[0].action
         choice = choose(None, proposal.experts, proposal.novice, self._consensus)
         called = choice.call is Call.FEEDBACK
-        if choice.driver == Driver.NOVICE and not (called and self._shown and self.novice.trained):
+        knows_more = self._plus.shown and self._shown and self.novice.trained
+        if choice.driver == Driver.NOVICE and not (called and knows_more):
             choice = replace(choice, driver=first, action=a_1, label=None if called else a_1)
         elif choice.driver not in (first, Driver.MEAN):
             choice = replace(choice, label=None)

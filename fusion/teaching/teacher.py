@@ -9,7 +9,7 @@ import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from types import MappingProxyType
-from typing import Annotated, Literal
+from typing import Annotated, Literal, TypeVar
 
 import numpy as np
 from msgspec import Meta
@@ -24,6 +24,7 @@ from lira.hal.config import Table
 from lira.hal.messages import Action, Call, CourseState
 from lira.hal.profile import RobotProfile
 
+Lengths = TypeVar("Lengths", float, NDArray[np.float64])
 Share = Annotated[float, Meta(ge=0.0, le=1.0)]
 
 
@@ -206,7 +207,7 @@ class ScriptedTeacher:
 
     def _unsafe(self, state: CourseState) -> bool:
         """Whether it is too near to a box or too far from the line: what comes after it changes nothing."""
-        off = self._off_line(np.asarray(state.lateral_m), np.asarray(state.clearance_m))
+        off = self._off_line(state.lateral_m, state.clearance_m)
         return state.collided or state.clearance_m < self._settings.margin_m or bool(off)
 
     def _turns_back(self, state: CourseState, drive: list[CourseState]) -> bool:
@@ -214,9 +215,8 @@ class ScriptedTeacher:
         return drive[-1].progress_m < state.progress_m - self._settings.back * self._full_speed_m(self._steps)
 
     def _stalls(self, state: CourseState, drive: list[CourseState]) -> bool:
-        x_m, y_m = np.array([(each.x_m, each.y_m) for each in (state, *drive)]).T
-        driven_m = np.hypot(np.diff(x_m), np.diff(y_m)).sum()
-        return bool(driven_m < self._settings.stall * self._full_speed_m(len(drive)))
+        driven_m = sum(map(_gap_m, (state, *drive[:-1]), drive))
+        return driven_m < self._settings.stall * self._full_speed_m(len(drive))
 
     def _full_speed_m(self, steps: int) -> float:
         """How far the robot gets at most within some steps."""
@@ -240,10 +240,11 @@ class ScriptedTeacher:
         close = futures.clearance_m < self._settings.margin_m + 0.1
         far = self._off_line(futures.lateral_m, futures.clearance_m)
         back = np.abs(futures.heading_error_rad[:, 0]) > math.pi / 2
-        return bool(close.any() or far.any() or back.any())
+        return bool(close.any() or np.any(far) or back.any())
 
-    def _off_line(self, lateral_m: NDArray[np.float64], clearance_m: NDArray[np.float64]) -> NDArray[np.bool_]:
-        settings, off_m = self._settings, np.abs(lateral_m)
+    def _off_line(self, lateral_m: Lengths, clearance_m: Lengths) -> NDArray[np.bool_] | bool:
+        """Whether it is too far from the line, one robot or many."""
+        settings, off_m = self._settings, abs(lateral_m)
         strayed = (off_m > settings.stray_m) & (clearance_m > settings.free_m)
         return settings.follow_line & ((off_m > settings.lateral_m) | strayed)
 

@@ -105,7 +105,8 @@ class GovernedRobot:
         # It looks before each slice and not after the last: what the caller does next may be the command it misses.
         while (now_s := self._robot.now()) < until_s - ROUNDING_S:
             self.tick()
-            self._robot.wait(until_s if until_s - now_s < SLICE_S + ROUNDING_S else now_s + SLICE_S)
+            slice_s = self._slice_s(now_s)
+            self._robot.wait(until_s if until_s - now_s < slice_s + ROUNDING_S else now_s + slice_s)
 
     def pass_time(self, until_s: float) -> None:
         """As `wait`, for a server that has its watchdog on another thread; not as long if there is something new."""
@@ -145,6 +146,10 @@ class GovernedRobot:
         if not is_fresh(scan.stamp_s, now_s, field.max_age_s):
             return None
         return measure_clearance(self._profile, field, replace(scan, stamp_s=min(scan.stamp_s, now_s)))
+
+    def _slice_s(self, now_s: float) -> float:  # noqa: ARG002 - for those who know more
+        """How long the watchdog may look away from now on."""
+        return SLICE_S
 
     def _health(self) -> DeviceHealth:
         return DeviceHealth() if self._monitor is None else self._monitor.device_health()

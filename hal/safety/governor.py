@@ -92,6 +92,16 @@ class Governor:
         asked = command.answers, age_s, session, command.seq, command.commander
         return Applied(twist, now_s, source, reason, clamps, *asked, cut_m_s)
 
+    def steady_until(self, now_s: float) -> float:
+        """Until when `tick` says what it said last, as long as nothing is submitted and no device is lost.
+
+        That is `now_s` where it depends on more than time-outs: on a field, or on a speed that is still rising.
+        """
+        command = self._in_charge() if self._state is State.ARMED else None
+        if command is not None and (self._field is not None or self._last != self._within_limits(command.twist)):
+            return now_s
+        return min((each.stamp_s + self._timeouts_s[each.source] for each in self._live.values()), default=math.inf)
+
     def note_devices(self, lost: tuple[str, ...], losses: int) -> None:
         """Take in which devices are lost now, and how many losses there ever were: one between two looks counts too."""
         missed = losses > self._losses
@@ -194,13 +204,20 @@ class Governor:
         teleop = self._live.get(Source.TELEOP)
         return teleop is not None and not teleop.released
 
+    def _within_limits(self, wanted: Twist) -> Twist:
+        linear, angular = self._limits
+        return Twist(
+            min(max(wanted.linear_m_s, -linear), linear),
+            min(max(wanted.angular_rad_s, -angular), angular),
+        )
+
     def _limit(self, wanted: Twist, now_s: float) -> tuple[Twist, tuple[str, ...], float]:
         """Cut to the profile's limits, then to what the field allows, then to what can be reached by now.
 
         Returns what is left, the names of what cut it, and the speed in m/s that the field took.
         """
-        linear = min(max(wanted.linear_m_s, -self._limits[0]), self._limits[0])
-        angular = min(max(wanted.angular_rad_s, -self._limits[1]), self._limits[1])
+        within = self._within_limits(wanted)
+        linear, angular = within.linear_m_s, within.angular_rad_s
         clamps = ["linear"] if linear != wanted.linear_m_s else []
         clamps += ["angular"] if angular != wanted.angular_rad_s else []
         asked = linear

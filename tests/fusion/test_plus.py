@@ -118,8 +118,8 @@ class TestPrefill:
         assert proposal.choice.driver != "camera"
         assert len(scene.shelf.labels) == 8
 
-    def disagreeing(self, *, trained=True):
-        scene = Scene(PlusSettings(prefill=60, reserve_s=0.0), trained=trained)
+    def disagreeing(self, *, trained=True, **parts):
+        scene = Scene(PlusSettings(prefill=60, reserve_s=0.0, **parts), trained=trained)
         scene.warm()
         scene.camera, scene.lidar = LEFT, RIGHT
         return scene
@@ -133,6 +133,11 @@ class TestPrefill:
         assert (proposal.choice.call, proposal.speed, lesson.stored) == (Call.FEEDBACK, 0.3, False)
         scene.camera = scene.lidar = CRUISE
         scene.warm()
+        assert scene.step()[0].choice.driver == "camera"
+
+    def test_without_that_part_the_first_expert_drives_on(self):
+        scene = self.disagreeing(shown=False)
+        scene.step(human=RIGHT)
         assert scene.step()[0].choice.driver == "camera"
 
     def test_a_novice_that_has_not_been_trained_does_not(self):

@@ -13,7 +13,7 @@ from lira.hal.profile import STOP_BUDGET_S, load_profile
 from lira.hal.safety.arming import TRANSITIONS, Event, State
 from lira.hal.safety.governor import GRACE_S, Governor
 
-PROFILE = load_profile("thesis-sim")
+PROFILE, ROSBOT = load_profile("thesis-sim"), load_profile("rosbot2")
 POLICY_S, TELEOP_S = PROFILE.control.policy_timeout_s, PROFILE.control.teleop_timeout_s
 GO, TURN = Twist(0.5, 0.0), Twist(0.0, 0.5)
 P, T = Source.POLICY, Source.TELEOP
@@ -155,6 +155,38 @@ def test_the_watchdog_strikes_at_the_time_out_and_wants_a_neutral_command():
     assert desk.at(1.0, policy(GO, 1.0)).reason is Reason.NEUTRAL_FIRST
     desk.armed(1.1)
     assert desk.at(1.2, policy(GO, 1.2)).twist == GO
+
+
+@given(st.lists(st.tuples(st.sampled_from([P, T]), st.sampled_from([STOP, GO, TURN]), st.floats(0.0, 0.3)), max_size=8))
+def test_until_what_is_said_to_be_steady_ends_nothing_else_is_said(commands):
+    desk, now_s = Desk(), 0.0
+    for source, twist, passed_s in commands:
+        now_s += passed_s
+        said = desk.at(now_s, Command(twist, now_s, source))
+    if not commands:
+        said = desk.at(now_s)
+    end_s = desk.governor.steady_until(now_s)
+    last_s = min(end_s, now_s + 1.0)
+    for share in (0.25, 0.5, 0.99):
+        later = desk.at(now_s + share * (last_s - now_s))
+        assert (later.twist, later.source, later.reason) == (said.twist, said.source, said.reason)
+
+
+def test_what_a_command_moves_is_steady_until_its_time_out():
+    desk = Desk().armed()
+    desk.at(0.1, policy(GO, 0.1))
+    assert desk.governor.steady_until(0.1) == pytest.approx(0.1 + POLICY_S)
+    assert desk.at(desk.governor.steady_until(0.1)).reason is Reason.STALE
+    assert desk.governor.steady_until(0.5) == math.inf
+
+
+@pytest.mark.parametrize("profile", [ROSBOT, msgspec.structs.replace(ROSBOT, field=None)])
+def test_nothing_is_steady_behind_a_field_or_while_the_speed_rises(profile):
+    governor = Governor(profile)
+    for command in (Command(STOP, 0.0), Command(GO, 0.0)):
+        governor.submit(command, 0.0)
+        governor.tick(0.0)
+    assert governor.steady_until(0.0) == 0.0
 
 
 def test_silence_after_a_neutral_command_wants_a_neutral_command_again():

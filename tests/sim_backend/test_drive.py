@@ -215,3 +215,14 @@ def test_whoever_is_put_down_into_a_box_has_collided_and_can_leave():
     robot.command(Twist(1.0, 0.0))
     robot.advance(2.0)
     assert robot.state().x_m == pytest.approx(5.3)
+
+
+@pytest.mark.parametrize("base", [KINEMATIC, WHEELS])
+def test_a_path_is_the_same_to_the_bit_as_step_after_step(base):
+    start = drive.Motion(*(np.full(3, value) for value in (1.0, 2.0, 0.5, 0.3, -0.2)))
+    linear, angular = np.random.default_rng(0).uniform(-1.0, 1.0, (2, 3, 5))
+    angular[0] = 0.0
+    path = drive.path(base, start, linear, angular, 0.1)
+    for k in range(5):
+        start = drive.step(base, start, linear[:, k], angular[:, k], 0.1)
+        assert [values[:, k].tolist() for values in path.arrays] == [values.tolist() for values in start.arrays]

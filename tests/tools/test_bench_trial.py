@@ -46,9 +46,18 @@ def test_a_trial_is_shared_out_and_left_as_it_was():
     before = PinholeCamera.render, ScriptedTeacher.act, ScriptedTeacher._foresee
     learning = msgspec.structs.replace(USUAL[0].learning, labels_per_step=1000)
     method = msgspec.structs.replace(USUAL[0], learning=learning)
-    row = bench.measure(Trial(method, "lane", 0, laps=1, unseen=0))
+    spent = bench.measure(Trial(method, "lane", 0, laps=1, unseen=0))
     assert before == (PinholeCamera.render, ScriptedTeacher.act, ScriptedTeacher._foresee)
+    assert set(spent.by_share_s) == set(bench.SHARES)
+    assert min(spent.by_share_s.values()) > 0.0
+    row = bench.summary(method.name, [spent])
     assert row["method"] == method.name
     assert sum(row[share] for share in bench.SHARES) == pytest.approx(1.0)
-    assert min(row[share] for share in bench.SHARES) > 0.0
-    assert row["processor_s"] > 0.0
+    assert row["processor_s"] == pytest.approx(spent.processor_s)
+
+
+def test_one_long_trial_does_not_make_a_method_slow():
+    trials = [bench.Spent(2.0 * seconds, {"rest": seconds}, laps) for seconds, laps in ((4.0, 4), (20.0, 10), (6.0, 6))]
+    row = bench.summary("some", trials)
+    assert (row["seeds"], row["seconds"], row["processor_s"], row["processor_s_worst"]) == (3, 12.0, 6.0, 20.0)
+    assert (row["laps"], row["processor_s_per_lap"], row["rest"]) == (6, 1.0, 1.0)

@@ -12,7 +12,7 @@ Row = dict[str, object]
 
 BENCHES = {
     "twin": "the twin in process: times real time as a sketch and in pybullet, which is put beside its bare calls",
-    "trial": "one trial of each of the usual methods: seconds, those of the processor, and what they are spent on",
+    "trial": "trials of the usual methods, medians over --seeds: seconds, those of the processor, and their shares",
     "lockstep": "twin and learner in two processes over the bus in lockstep: times real time",
     "latency": "from a capture to the applied command through the whole stack, beside a bare zenoh echo",
     "takeover": "from pressing the dead-man to the applied command, while a policy drives",

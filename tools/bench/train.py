@@ -1,4 +1,10 @@
-"""One training step (50 updates of 32) beside a plain float32 PyTorch loop, and what it does to the control loop."""
+"""One training step (50 updates of 32) beside a plain float32 PyTorch loop, and what it does to the control loop.
+
+From scratch, with f = 16, a step is 22 GFLOP, nearly eight tenths of them the second convolution forward and back;
+more than half of the time goes into PyTorch's convolutions (oneDNN). On one core of a Xeon the step runs at 51 GFLOP/s,
+where products of matrices of these shapes reach 108 and large ones 160: with the convolutions written out as such
+products a step could be about 1.4 times as fast, no more.
+"""
 
 import statistics
 import time

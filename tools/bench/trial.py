@@ -1,6 +1,9 @@
-"""One trial of each of the usual methods, alone on a core: how long it takes, and what it spends its time on.
+"""Trials of each of the usual methods, alone on a core: how long one takes, and what it spends its time on.
 
-`processor_s` is what it took of the processor, and `seconds` what passed meanwhile: more, where others compute, too.
+A trial takes as many laps as its novice needs, which differ widely: numbers are medians over the trials of a few seeds,
+but for the shares, which are of all of them together. `processor_s_per_lap` says more of the code than of the novices.
+
+`processor_s` is what a trial took of the processor, and `seconds` what passed meanwhile: more, where others compute.
 Shares are of the processor's time and add up to 1. `render` and `rays` are camera and lidar of the twin that is driven
 and of the one in which the scripted teacher looks ahead, `teacher` is the rest of what it does, `inference` is what the
 policies make of what they see, `training` is labels and learning; `rest` is motion, referee, control loop and
@@ -9,8 +12,10 @@ bookkeeping.
 
 import time
 from collections import defaultdict
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
+from dataclasses import dataclass
+from statistics import median
 from typing import Any
 
 from lira.fusion.methods.base import Method
@@ -22,29 +27,55 @@ from lira.tools.experiments.methods import USUAL
 from lira.tools.experiments.trial import Trial, play
 
 WORLD = "line-obstacles"
-SEED = 200
+SEED = 200  # the first
+SEEDS = 3
 SHARES = ("render", "rays", "teacher", "training", "inference", "rest")
 
 
-def run() -> list[Row]:
-    """Return a row for each method."""
+def run(seeds: int = SEEDS) -> list[Row]:
+    """Return a row for each method, from so many trials."""
     play(Trial(USUAL[0], "lane", SEED, laps=1, unseen=0))  # what is loaded and built but once
-    return [measure(Trial(method, WORLD, SEED)) for method in USUAL]
+    return [
+        summary(method.name, [measure(Trial(method, WORLD, SEED + number)) for number in range(seeds)])
+        for method in USUAL
+    ]
 
 
-def measure(trial: Trial) -> Row:
+@dataclass(frozen=True, slots=True)
+class Spent:
+    """What one trial took: by the clock, of the processor by share, and in laps."""
+
+    seconds: float
+    by_share_s: Mapping[str, float]
+    laps: int
+
+    @property
+    def processor_s(self) -> float:
+        """Of the processor, all together."""
+        return sum(self.by_share_s.values())
+
+
+def measure(trial: Trial) -> Spent:
     """Play a trial, and say where its time went."""
     began_s, meter = time.perf_counter(), Meter()
     with watched(meter):
         outcome = play(trial)
-    spent_s = meter.stop()
-    processor_s = sum(spent_s.values())
+    by_share_s = dict(meter.stop())
+    return Spent(time.perf_counter() - began_s, by_share_s, len(outcome.laps))
+
+
+def summary(method: str, trials: Sequence[Spent]) -> Row:
+    """Sum up a method's trials."""
+    processor_s = sum(trial.processor_s for trial in trials)
     return {
-        "method": trial.method.name,
-        "seconds": time.perf_counter() - began_s,
-        "processor_s": processor_s,
-        "laps": len(outcome.laps),
-        **{share: spent_s[share] / processor_s for share in SHARES},
+        "method": method,
+        "seeds": len(trials),
+        "seconds": median(trial.seconds for trial in trials),
+        "processor_s": median(trial.processor_s for trial in trials),
+        "processor_s_worst": max(trial.processor_s for trial in trials),
+        "processor_s_per_lap": median(trial.processor_s / trial.laps for trial in trials),
+        "laps": median(trial.laps for trial in trials),
+        **{share: sum(trial.by_share_s.get(share, 0.0) for trial in trials) / processor_s for share in SHARES},
     }
 
 

@@ -5,7 +5,7 @@ from contextlib import contextmanager
 
 from lira.fusion.experts.tasks import TASKS, task_of
 from lira.hal.profile import RobotProfile, load_profile
-from lira.hal.safety.governed import GovernedRobot
+from lira.hal.safety.governed import SLICE_S, GovernedRobot
 from lira.sim_backend.catalogue import load_world
 from lira.sim_backend.scenes.opening import Renderer
 from lira.sim_backend.twin import Twin
@@ -15,9 +15,18 @@ from lira.sim_backend.world import World
 class SimulatedRobot(GovernedRobot):
     """A twin behind its governor. `arena` is what a floor has not: a fresh start, and where the robot really is."""
 
-    def __init__(self, twin: Twin) -> None:
+    def __init__(self, twin: Twin, *, realtime: bool) -> None:
+        """With `realtime` its time passes by itself."""
         super().__init__(twin)
         self.arena = twin
+        self._realtime = realtime
+
+    def _slice_s(self, now_s: float) -> float:
+        """Up to the next time-out, where time passes only here: nobody does anything meanwhile, and no device fails."""
+        if self._realtime:
+            return SLICE_S
+        with self._lock:
+            return max(SLICE_S, self._governor.steady_until(now_s) - now_s)
 
 
 @contextmanager
@@ -40,7 +49,7 @@ def simulate(
     kind = TASKS[task_of(place.name)].profile if profile is None else profile
     body = load_profile(kind) if isinstance(kind, str) else kind
     twin = Twin(body, place, layout=layout, seed=seed, renderer=renderer, realtime_factor=realtime_factor)
-    robot = SimulatedRobot(twin)
+    robot = SimulatedRobot(twin, realtime=realtime_factor is not None)
     try:
         robot.open()
         yield robot

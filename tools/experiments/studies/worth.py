@@ -108,7 +108,7 @@ ABLATION = Worth(
 VARIANTS = Worth(
     {
         "hold": ("hold-mirrored",),
-        "plus": ("plus-ask", "plus-practice", "plus-sure"),
+        "plus": ("plus-ask", "plus-practice"),
         "hg-dagger": ("hg-dagger-trunks", "hg-dagger-mirrored", "hg-dagger-doubt"),
     }
 )

@@ -5,6 +5,7 @@ examples:
   lira bench twin --json -              one JSON object {name, machine, results} and nothing else on standard output
   lira bench latency --json latency.json
   lira bench soak --minutes 5
+  lira bench trial --seeds 10           medians over ten trials of each method
   lira bench drivers --minutes 10       how many samples the lidar's line loses in ten minutes
   lira bench twin --history bench/history   note its ratios there, and compare them with those before
 
@@ -19,10 +20,11 @@ from pathlib import Path
 
 from lira.hal.errors import ConfigError
 from lira.tools.bench import BENCHES, Row, describe_machine
-from lira.tools.options import add_json
+from lira.tools.options import add_json, positive
 from lira.tools.output.machine import table, take_stdout, write_file
 
 LASTING = ("soak", "drivers", "record")  # those that go on for --minutes
+SEEDED = ("trial",)  # those that play the trials of so many --seeds
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -34,6 +36,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         type=float,
         help="how long the soak (default: 30), the line of drivers (0.25) or each half of record (1) goes on",
     )
+    parser.add_argument("--seeds", type=positive, metavar="N", help="trials of each method in trial (default: 3)")
     add_json(parser)
     parser.add_argument("--history", type=Path, metavar="DIR", help="add the ratios to DIR/NAME.jsonl and compare")
 
@@ -42,9 +45,12 @@ def run(args: argparse.Namespace) -> int:
     """Run one benchmark and show its rows."""
     if args.minutes is not None and args.name not in LASTING:
         raise ConfigError(f"'{args.name}' takes no --minutes", f"Only {' and '.join(LASTING)} do.")
+    if args.seeds is not None and args.name not in SEEDED:
+        raise ConfigError(f"'{args.name}' takes no --seeds", f"Only {' and '.join(SEEDED)} does.")
     output = take_stdout() if args.json == "-" else sys.stdout
     module = importlib.import_module(f"lira.tools.bench.{args.name}")
-    results: list[Row] = module.run(args.minutes) if args.minutes is not None else module.run()
+    given = [value for value in (args.minutes, args.seeds) if value is not None]
+    results: list[Row] = module.run(*given)
     text = json.dumps({"name": args.name, "machine": describe_machine(), "results": results}, indent=2)
     if args.json not in (None, "-"):
         write_file(Path(args.json), text)
