@@ -232,14 +232,17 @@ def test_noise_is_no_scan_and_the_head_turns_on_meanwhile(tmp_path):
 
 def test_a_warning_and_what_it_does_is_told(tmp_path):
     with Bench(tmp_path / "lidar", replace(MODELS["a2m8-1.29"], warning=0x0042, spin_up_s=0.0)) as bench:
-        bench.wait_scans(3)
-        told = bench.driver.diagnostics()
+        until_s, rate = time.monotonic() + 20.0, math.nan
+        while rate != pytest.approx(7874, rel=0.1):  # on a busy machine they come in bursts
+            assert time.monotonic() < until_s, rate
+            bench.wait_scans(3)
+            told = bench.driver.diagnostics()
+            values = dict(told.values)
+            rate = float(values["samples/s"])
     assert told.level == 1
     assert "0x0042" in told.message
-    values = dict(told.values)
     assert values["firmware"] == "1.29"
     assert values["mode"] == "Sensitivity (0x84)"
-    assert float(values["samples/s"]) == pytest.approx(7874, rel=0.1)
     assert values["bytes lost"] == "0"
 
 
