@@ -38,7 +38,7 @@ def test_whoever_floods_the_wheels_stop_in_time_and_memory_stays_small(kind, att
         assert scene.wait(scene.moves, 10.0)
         attackers = [scene.attacker(*attack) for attack in attacks]
         time.sleep(FLOOD_S)
-        scene.wait(scene.moves, 3.0)  # a flood may keep the driver's commands away; then it stands
+        scene.wait(scene.moves, 1.5)  # a flood may keep the driver's commands away; then it stands
         kill(driver)
         assert scene.wait(lambda: not scene.moves(), 5.0)
         time.sleep(0.3)

@@ -6,6 +6,7 @@ import uuid
 from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
@@ -211,7 +212,7 @@ RECORDED_S = 30.0
 EPOCH = 3
 
 
-def record(robot: NullRobot, folder: Path) -> Recording:
+def record(robot: NullRobot, folder: Path) -> None:
     """Record a robot that nobody drives, as `lira record` would."""
     began_s = robot.now()
     head = Head("rosbot", "0", 0, round(began_s * 1e9), Info(robot.profile, LOCKSTEP, EPOCH))
@@ -225,18 +226,23 @@ def record(robot: NullRobot, folder: Path) -> Recording:
                     beside = Attachment(EPOCH, seen.seq, now_ns).to_bytes()
                     writer.add(RawSample(topic.key, topic.ros_type, encode(message), beside, 0.0), now_ns, now_ns)
             robot.wait(robot.now() + 0.05)
-    return Recording(folder)
+
+
+@cache
+def recorded() -> TemporaryDirectory[str]:
+    """A folder with the recording of a null robot that nobody drives; it goes when this process ends."""
+    folder = TemporaryDirectory()
+    record(NullRobot(PROFILE), Path(folder.name) / "rec")
+    return folder
 
 
 @contextmanager
 def recording() -> Iterator[Rig]:
-    with TemporaryDirectory() as name:
-        inner = NullRobot(PROFILE)
-        played = RecordedRobot(record(inner, Path(name) / "rec"))
-        robot = GovernedRobot(played)
-        robot.open()
-        yield Rig(robot, played, played)
-        robot.close()
+    played = RecordedRobot(Recording(Path(recorded().name) / "rec"))
+    robot = GovernedRobot(played)
+    robot.open()
+    yield Rig(robot, played, played)
+    robot.close()
 
 
 # `real_time` and `stepped` robots by name: some promises make no sense for them.

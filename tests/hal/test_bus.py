@@ -6,7 +6,7 @@ import time
 
 import pytest
 import zenoh
-from wiring import new_endpoint, new_name, wait_for
+from wiring import new_endpoint, new_name, paired, wait_for
 
 from lira.hal.bus.bus import Bus
 from lira.hal.bus.topics import BATTERY, CMD_VEL, ODOM, TOPICS
@@ -16,12 +16,10 @@ from lira.hal.messages import BatteryState, Odometry, Twist
 
 @pytest.fixture
 def pair():
-    name, endpoint = new_name(), new_endpoint()
-    robot, client = Bus(name, listen=endpoint), Bus(name, connect=endpoint)
-    yield robot, client
-    assert client.close()
-    assert robot.close()
-    assert robot.close()
+    with paired() as buses:
+        yield buses
+        assert buses[1].close()
+        assert buses[0].close()  # may be called twice
 
 
 def odom(x_m):

@@ -6,16 +6,15 @@ from types import SimpleNamespace
 
 import pytest
 import zenoh
-from wiring import PROFILE, joined, new_endpoint, new_name, ready, real_time_null, remote, served, wait_for
+from wiring import PROFILE, joined, paired, ready, real_time_null, remote, served, wait_for
 
 from lira.hal.bus.attachment import Attachment
 from lira.hal.bus.boundary import Boundary
-from lira.hal.bus.bus import Bus
 from lira.hal.bus.questions import QUESTIONS
 from lira.hal.bus.reader import Reader
-from lira.hal.bus.topics import CMD_VEL, ESTOP, INFO
+from lira.hal.bus.topics import CMD_VEL, ESTOP, INFO, JOY
 from lira.hal.errors import BusError
-from lira.hal.messages import STOP, Bool, Command, Reason, Twist
+from lira.hal.messages import STOP, Bool, Command, Joy, Reason, Twist
 from lira.hal.messages.codec import encode
 from lira.hal.server.command_reader import BURST, DEPTH, ESTOP_DEPTH, Inlet, Order
 
@@ -43,16 +42,21 @@ def test_who_sends_under_many_sessions_fills_nothing():
 
 @pytest.fixture
 def pair():
-    name, endpoint = new_name(), new_endpoint()
-    robot, client = Bus(name, listen=endpoint), Bus(name, connect=endpoint)
-    yield robot, client
-    assert client.close()
-    assert robot.close()
+    with paired() as buses:
+        yield buses
 
 
 def put(client, topic, payload, attachment=None):
     """In order, and as fast as can be."""
     client._session.put(f"{client.robot}/{topic.key}", payload, attachment=attachment)
+
+
+def let_all_come(robot, client):
+    """Wait until all that was put has come: what is put last overtakes nothing on the same link."""
+    last = robot.reader(JOY)
+    ready(client, JOY)
+    put(client, JOY, encode(Joy(1.0, (), ())))
+    wait_for(lambda: last.newest() is not None)
 
 
 def test_a_repeated_command_renews_nothing(pair):
@@ -73,7 +77,7 @@ def test_what_a_link_held_back_of_a_ros_peer_does_not_count_as_said_now(pair):
     ready(client)
     for _ in range(BURST):
         put(client, CMD_VEL, encode(GO))
-    time.sleep(0.3)
+    let_all_come(robot, client)
     assert inlet.policy(1.0) == []
     assert robot.boundary.counts == {("cmd_vel", "burst"): BURST}
     put(client, CMD_VEL, encode(STOP))
@@ -86,7 +90,7 @@ def test_a_poll_ends_however_much_there_is(pair):
     ready(client)
     for seq in range(3 * DEPTH):
         put(client, CMD_VEL, encode(GO), Attachment(9, seq, 0).to_bytes())
-    time.sleep(0.3)
+    let_all_come(robot, client)
     assert len(inlet.policy(0.0)) == len(reader.poll()) == DEPTH
     assert reader.full
     assert reader.poll() == []
@@ -128,12 +132,12 @@ def test_a_press_among_ever_so_many_idle_messages_is_not_lost(pair):
     inlet = Inlet(robot, PROFILE.control)
     ready(client, ESTOP)
     put(client, ESTOP, encode(Bool(False)))
-    time.sleep(0.2)
+    let_all_come(robot, client)
     assert not inlet.estop()
     put(client, ESTOP, encode(Bool(True)))
     for _ in range(2 * ESTOP_DEPTH):
         put(client, ESTOP, encode(Bool(False)))
-    time.sleep(0.3)
+    let_all_come(robot, client)
     assert inlet.estop()
 
 
@@ -149,7 +153,7 @@ def test_a_press_that_is_shown_again_presses_once_whatever_came_between(pair):
         time.sleep(0.001)
         assert not inlet.estop()
     put(client, ESTOP, encode(Bool(True)), press)
-    time.sleep(0.2)
+    let_all_come(robot, client)
     assert not inlet.estop()
 
 

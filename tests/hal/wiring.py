@@ -93,6 +93,19 @@ def served(inner: NullRobot, *, lockstep: bool = False, floor: bool = False, **m
 
 
 @contextmanager
+def paired() -> Iterator[tuple[Bus, Bus]]:
+    """A robot's bus and a client's, once both of their links are up: while one is missing, messages may overtake."""
+    name, endpoint = new_name(), new_endpoint()
+    robot, client = Bus(name, listen=endpoint), Bus(name, connect=endpoint)
+    try:
+        wait_for(lambda: robot.links() == client.links() == 2)
+        yield robot, client
+    finally:
+        assert client.close()
+        assert robot.close()
+
+
+@contextmanager
 def joined(robot: Served) -> Iterator[Bus]:
     bus = Bus(robot.name, connect=robot.endpoint)
     try:
@@ -119,7 +132,8 @@ def remote(robot: Served) -> Iterator[RemoteRobot]:
             client.close()
 
 
-def wait_for(condition: Callable[[], bool], timeout_s: float = 5.0) -> None:
+def wait_for(condition: Callable[[], bool], timeout_s: float = 20.0) -> None:
+    """For what is certain to come: only what hangs takes that long."""
     deadline_s = time.monotonic() + timeout_s
     while not condition():
         assert time.monotonic() < deadline_s, "never happened"

@@ -66,23 +66,37 @@ def test_a_clock_that_goes_back_is_another_clock():
     assert clock.delay_s(103.4, 54.4) == pytest.approx(0.0, abs=1e-3)
 
 
-def feed(frames):
-    """Read these one after the other, then nothing."""
-    waiting = iter(frames)
+class Feed:
+    """Reads these one after the other, then nothing."""
 
-    def read():
-        frame = next(waiting, None)
+    def __init__(self, frames):
+        self._waiting, self._empty = iter(frames), threading.Event()
+
+    def __call__(self):
+        frame = next(self._waiting, None)
         if frame is None:
+            self._empty.set()
             time.sleep(0.01)
         return frame
 
-    return read
+    def wait(self):
+        """Until all were taken; who asks for more has put the last one down."""
+        assert self._empty.wait(20.0)
+
+
+def drained(frames):
+    """What reads these, once it has."""
+    feed = Feed(frames)
+    drain = Drain(feed, lambda: None)
+    feed.wait()
+    return drain
 
 
 def test_the_newest_is_kept_and_the_rest_passed_over():
     ended = threading.Event()
-    drain = Drain(feed([Frame(1.0 + k, None, k) for k in range(5)]), ended.set)
-    time.sleep(0.1)
+    feed = Feed([Frame(1.0 + k, None, k) for k in range(5)])
+    drain = Drain(feed, ended.set)
+    feed.wait()
     assert drain.newest(1.0) == Frame(5.0, None, 4)
     assert drain.newest(0.05) is None
     drain.close()
@@ -92,21 +106,19 @@ def test_the_newest_is_kept_and_the_rest_passed_over():
 def test_what_is_late_is_stamped_so_and_what_is_too_late_refused_with_its_lateness():
     steady = [Frame(100.0 + k * 0.1, k * 0.1, k) for k in range(20)]
     slightly, much = Frame(102.0 + 0.2, 2.0, 20), Frame(102.1 + 2.0, 2.1, 21)
-    drain = Drain(feed([*steady, slightly]), lambda: None)
-    time.sleep(0.1)
+    drain = drained([*steady, slightly])
     assert drain.newest(0.1).arrived_s == pytest.approx(102.0, abs=0.01)
     drain.close()
-    drain = Drain(feed([*steady, much]), lambda: None)
-    time.sleep(0.1)
+    drain = drained([*steady, much])
     assert drain.newest(0.05).body == 19
     drain.close()
     gate = threading.Event()
-    later = feed([much])
-    read = feed(steady)
+    later, read = Feed([much]), Feed(steady)
     drain = Drain(lambda: later() if gate.is_set() else read(), lambda: None)
-    time.sleep(0.1)
+    read.wait()
     assert drain.newest(0.1).body == 19
     gate.set()
+    later.wait()
     with pytest.raises(SensorError, match=r"its pictures come 2\.0 s late"):
         drain.newest(0.1)
     drain.close()

@@ -50,7 +50,7 @@ def test_a_controller_that_wants_stamps_gets_them_on_its_own_clock(far):
         get_going(client)
         schema = Schema(1, data=definition(STAMPED).encode(), encoding="ros2msg", name=STAMPED)
         decode = DecoderFactory().decoder_for("cdr", schema)
-        wait_for(lambda: decode(robot.commands[-1][1]).twist.linear.x == 0.3)
+        wait_for(lambda: robot.commands and decode(robot.commands[-1][1]).twist.linear.x == 0.3)
         came_ns, payload = robot.commands[-1]
         message = decode(payload)
         assert message.twist.angular.z == 0.5

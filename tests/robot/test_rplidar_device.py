@@ -32,6 +32,7 @@ from lira.sim_backend.emulators.wire import Wire
 
 LIDAR = load_profile("rosbot2").lidar
 SETTINGS = LidarSettings(spin_up_s=0.0)
+LAST_WORDS_S = 1.0  # that a driver is done says not that all is through the wire
 
 
 def room(theta_rad):
@@ -58,10 +59,12 @@ class Bench:
 
     def __exit__(self, *_):
         self.supervisor.close()
-        time.sleep(0.05)  # the last words are still on the wire
+        until_s = time.monotonic() + LAST_WORDS_S
+        while (self.unit.scanning or self.unit.pwm) and time.monotonic() < until_s:
+            time.sleep(0.01)
         self.wire.close()
 
-    def wait_scans(self, count, timeout_s=5.0):
+    def wait_scans(self, count, timeout_s=20.0):
         until_s, count = time.monotonic() + timeout_s, len(self.scans) + count
         while len(self.scans) < count:
             assert time.monotonic() < until_s, self.supervisor.failure
@@ -229,14 +232,17 @@ def test_noise_is_no_scan_and_the_head_turns_on_meanwhile(tmp_path):
 
 def test_a_warning_and_what_it_does_is_told(tmp_path):
     with Bench(tmp_path / "lidar", replace(MODELS["a2m8-1.29"], warning=0x0042, spin_up_s=0.0)) as bench:
-        bench.wait_scans(3)
-        told = bench.driver.diagnostics()
+        until_s, rate = time.monotonic() + 20.0, math.nan
+        while rate != pytest.approx(7874, rel=0.1):  # on a busy machine they come in bursts
+            assert time.monotonic() < until_s, rate
+            bench.wait_scans(3)
+            told = bench.driver.diagnostics()
+            values = dict(told.values)
+            rate = float(values["samples/s"])
     assert told.level == 1
     assert "0x0042" in told.message
-    values = dict(told.values)
     assert values["firmware"] == "1.29"
     assert values["mode"] == "Sensitivity (0x84)"
-    assert float(values["samples/s"]) == pytest.approx(7874, rel=0.1)
     assert values["bytes lost"] == "0"
 
 
@@ -282,9 +288,10 @@ def test_the_motor_stops_on_sigterm_and_a_killed_program_does_not_spoil_the_next
     os.kill(child.pid, number)
     child.wait(10.0)
     child.stdout.close()
-    time.sleep(0.05)
-    assert bench.unit.scanning == (number == signal.SIGKILL)
-    assert (bench.unit.pwm > 0) == (number == signal.SIGKILL)
+    until_s, goes_on = time.monotonic() + 10.0, number == signal.SIGKILL
+    while (bench.unit.scanning, bench.unit.pwm > 0) != (goes_on, goes_on):  # its last words are still on the wire
+        assert time.monotonic() < until_s
+        time.sleep(0.01)
     with bench:
         assert around(bench.wait_scans(1), 0) == pytest.approx(1.0, abs=0.02)
 
@@ -299,7 +306,8 @@ def scanning(request, tmp_path_factory):
         "STANDARD": STANDARD_MODE,
     }
     model = Model(baud=256000, modes=(STANDARD_MODE, modes[request.param]))
-    with Bench(tmp_path_factory.mktemp("wire") / "lidar", model) as bench:
+    with pytest.MonkeyPatch.context() as patch, Bench(tmp_path_factory.mktemp("wire") / "lidar", model) as bench:
+        patch.setattr("lira.robot.rplidar.speed.SILENCE_S", 5.0)  # a busy machine is silent, too; here bytes are tried
         bench.wait_scans(1)
         yield bench
 

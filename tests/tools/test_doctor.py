@@ -27,6 +27,7 @@ from lira.tools.launch.processes import ChildProcess, free_port, lira_command
 
 PATIENT = Patient(load_profile("rosbot2"))
 MACHINE = [check for check in CHECKS if not check.wanted]
+ROOM = ("--profile", "rosbot2", "--world", "room", "--renderer", "sketch")
 
 
 def test_this_machine_is_looked_at_and_nothing_about_it_breaks_a_check():
@@ -151,7 +152,7 @@ def diagnose(path, *words):
 
 def test_devices_are_looked_at_live_and_a_picture_is_kept(tmp_path):
     folder, picture = tmp_path / "wire", tmp_path / "seen.jpg"
-    command = lira_command("twin", "--wire", str(folder), "--profile", "rosbot2", "--world", "room")
+    command = lira_command("twin", "--wire", str(folder), *ROOM)
     with ChildProcess("the devices", command, tmp_path / "twin.log") as twin:
         line = twin.wait_ready("open them with: lira robot", 60.0)
         words = re.search(r"lira robot (.*)", line)[1].split()

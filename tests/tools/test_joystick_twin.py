@@ -2,6 +2,7 @@
 
 import signal
 import time
+from contextlib import suppress
 
 import pytest
 from pad_bed import SONY, Bed, library
@@ -20,6 +21,7 @@ if library() is None:
 
 PAD = 5
 READY_S = 60.0
+PRESSES = 5
 
 
 def newest(reader, condition, timeout_s=30.0):
@@ -124,7 +126,7 @@ def test_a_press_takes_control_from_the_learner_which_labels_it(bed, hand, watch
     assert isinstance(result, ResultRecord)
     # What the hand did beyond the first training step is no demonstration any more.
     given = result.account.given
-    assert (result.proof, given["demonstration"] + given["human"]) == ("none", len(by_hand))
+    assert (result.proof, given["demonstration"] + given.get("human", 0)) == ("none", len(by_hand))
     page = write_report(tmp_path / "run").read_text(encoding="utf-8")
     assert "nothing was proven" in page
     assert "Where it drove" in page
@@ -138,6 +140,15 @@ def press(bed, name, held_s=0.1):
     bed.key(PAD, name, 0)
 
 
+def answered(bed, name, answers, condition, held_s=0.1):
+    """Press until there is an answer: a bridge that gets no time may see a button only when it is up again."""
+    for _ in range(PRESSES):
+        press(bed, name, held_s)
+        with suppress(AssertionError):
+            return newest(answers, condition, 5.0)
+    raise AssertionError(f"{name}: no answer")
+
+
 def test_a_person_pauses_saves_chooses_and_begins_anew_with_the_pad(bed, hand, watch, address, tmp_path):
     labels = tmp_path / "run" / "labels.lira"
     decisions, applied = watch.reader(DECISION), watch.reader(APPLIED, depth=64)
@@ -145,8 +156,7 @@ def test_a_person_pauses_saves_chooses_and_begins_anew_with_the_pad(bed, hand, w
     with learner(address, tmp_path, "--method", "lira", "--start", "experts") as process:
         newest(state, lambda s: s.progress_m > 1.0, READY_S)
 
-        press(bed, "BTN_WEST")
-        answer = newest(answers, lambda a: a.paused)
+        answer = answered(bed, "BTN_WEST", answers, lambda a: a.paused)
         assert (answer.count, answer.accepted) == (1, True)
         hand.wait_ready("learner: paused: the robot stands", 10.0)
         process.wait_ready("operator: paused: the robot stands", 10.0)
@@ -164,25 +174,22 @@ def test_a_person_pauses_saves_chooses_and_begins_anew_with_the_pad(bed, hand, w
         assert labels.stat().st_size == size
         applied.poll()
 
-        press(bed, "BTN_WEST")
-        newest(answers, lambda a: a.count == 2 and not a.paused)
+        answered(bed, "BTN_WEST", answers, lambda a: a.count == 2 and not a.paused)
         results = [received.message for received in applied.poll()]
         newest(applied, lambda a: a.source is Source.POLICY and a.twist != STOP)
         results += [received.message for received in applied.poll()]
         assert results[0].twist == STOP  # neutral came first
         assert newest(decisions, lambda d: d.driver == "mean").lap == 0
 
-        press(bed, "BTN_DPAD_RIGHT")
-        answer = newest(answers, lambda a: a.count == 3)
+        answer = answered(bed, "BTN_DPAD_RIGHT", answers, lambda a: a.count == 3)
         assert (answer.accepted, answer.words) == (False, "this method gives no expert control")
 
-        press(bed, "BTN_NORTH")
-        assert newest(answers, lambda a: a.count == 4).words.startswith("saved ")
+        assert answered(bed, "BTN_NORTH", answers, lambda a: a.count == 4).words.startswith("saved ")
         process.wait_ready("operator: saved", 10.0)
         assert labels.stat().st_size > size
 
-        press(bed, "BTN_EAST", held_s=1.3)
-        assert newest(answers, lambda a: a.count == 5).words == "episode 1 begins, back at the start"
+        answer = answered(bed, "BTN_EAST", answers, lambda a: a.count == 5, held_s=1.3)
+        assert answer.words == "episode 1 begins, back at the start"
         assert newest(state, lambda s: s.progress_m < 0.5).progress_m >= 0.0
         newest(applied, lambda a: a.source is Source.POLICY and a.twist != STOP)
         newest(decisions, lambda d: d.lap == 1)

@@ -5,6 +5,7 @@ import itertools
 from pathlib import Path
 
 import pytest
+from short_trials import write_world
 
 from lira.fusion.log.run_log import RunWriter, VerdictRecord
 from lira.fusion.methods.presets import METHODS
@@ -148,7 +149,7 @@ def test_a_participant_reads_no_method_and_is_asked_for_consent_once(tmp_path):
 
 def test_a_dry_run_leaves_the_table_a_folder_for_each_and_the_page(tmp_path, monkeypatch, capsys):
     path = tmp_path / "plan.toml"
-    path.write_text(PLAN + "unseen = 0\n")
+    path.write_text(PLAN.replace('"lane"', f'"{write_world(tmp_path)}"') + "unseen = 0\n")
     monkeypatch.setattr(script, "LAPS", 1)
     assert main(["study", str(path), "--dry-run", "--to", str(tmp_path / "s")]) == 0
     rows = read_rows(tmp_path / "s" / "blocks.csv")

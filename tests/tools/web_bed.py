@@ -108,7 +108,7 @@ def wait_until(condition, timeout_s=15.0, what=""):
     until_s = time.monotonic() + timeout_s
     while not (found := condition()):
         assert time.monotonic() < until_s, what or condition
-        time.sleep(0.02)
+        time.sleep(0.05)  # to ask a browser is not free
     return found
 
 
