@@ -26,6 +26,7 @@ from lira.tools.verbs.robots import calibrate
 
 WALLS_M = (3.0, 1.7, -1.0, -1.3)  # ahead, left, behind, right of where it starts
 NO_FIELD = ["--profile", "thesis-sim"]  # whose robot may be driven without a lidar
+ATTEMPTS = 8
 QUICK = "# mine\n[lidar]\nspin_up_s = 0.0  # it turns\n\n[base]\nboot_s = 0.2\n"
 
 
@@ -110,14 +111,19 @@ def devices(folder, room):
             wire.close()
 
 
+def is_late(error):
+    """Whether it ended since the emulated board got no time to answer, as on a busy machine."""
+    return "no_base" in error or "no longer tells where it is" in error
+
+
 def calibrated(words, room, capsys):
     """Calibrate; returns what it says. On a busy machine sensors may be late: then it stops, and is begun again."""
-    for _ in range(4):
+    for _ in range(ATTEMPTS):
         room.put_back()
         if main(words) == 0:
             return capsys.readouterr().out
         error = capsys.readouterr().err
-        assert "the robot stopped" in error or "no longer tells where it is" in error
+        assert "the robot stopped" in error or is_late(error)
     raise AssertionError(error)
 
 
@@ -157,8 +163,11 @@ def test_with_a_tape_the_person_says_what_was_measured(tmp_path, capsys, monkeyp
 
 
 def refused(words, capsys):
-    assert main(words) == 2
-    return capsys.readouterr().err
+    for _ in range(ATTEMPTS):
+        assert main(words) == 2
+        if not is_late(error := capsys.readouterr().err):
+            break
+    return error
 
 
 def test_it_refuses_what_is_not_safe_and_writes_nothing(tmp_path, capsys, monkeypatch):
@@ -215,13 +224,18 @@ def test_a_kill_and_a_lost_terminal_end_it_with_wheels_and_lidar_still(tmp_path,
     room = Room()
     with devices(tmp_path, room) as (words, lidar, _, unit):
         command = lira_command(*words, *lidar, "--only", "distance")
-        with ChildProcess("the calibration", command, tmp_path / "calibrate.log") as child:
-            until_s = time.monotonic() + 20.0
-            while room.true[0] < 0.05:
-                assert time.monotonic() < until_s, child.output()
-                time.sleep(0.01)
-            child.signal(number)
-            assert child.wait(10.0) == EXIT_SIGNAL + number
+        for _ in range(ATTEMPTS):
+            room.put_back()
+            with ChildProcess("the calibration", command, tmp_path / "calibrate.log") as child:
+                until_s = time.monotonic() + 20.0
+                while room.true[0] < 0.05 and child.status() is None:
+                    assert time.monotonic() < until_s, child.output()
+                    time.sleep(0.01)
+                child.signal(number)
+                status = child.wait(10.0)
+                if not is_late(child.output()):
+                    break
+        assert status == EXIT_SIGNAL + number, child.output()
         assert room.twists[-1] == STOP
         assert room.true[0] < 0.3
         until_s = time.monotonic() + 10.0
