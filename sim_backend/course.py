@@ -60,6 +60,33 @@ class Obstacles:
         nearest: Floats = (outside + np.minimum(np.maximum(along, across), 0.0)).min(-1)
         return nearest
 
+    def free_ahead(self, x_m: Floats, y_m: Floats, yaw_rad: Floats, half_width_m: float) -> Floats:
+        """Metres from each place [...] straight ahead until a body of this width meets a box; +inf if it meets none.
+
+        What it meets first is a box at one of its sides, or a corner between them.
+        """
+        cos, sin = np.cos(yaw_rad), np.sin(yaw_rad)
+        left, right = (
+            self.straight_ahead(x_m - side_m * sin, y_m + side_m * cos, yaw_rad)
+            for side_m in (half_width_m, -half_width_m)
+        )
+        corner_x, corner_y = self._corners
+        off_x, off_y = corner_x - x_m[..., None], corner_y - y_m[..., None]
+        along = cos[..., None] * off_x + sin[..., None] * off_y
+        across = cos[..., None] * off_y - sin[..., None] * off_x
+        in_the_way = (np.abs(across) <= half_width_m) & (along >= 0.0)
+        corner: Floats = np.where(in_the_way, along, np.inf).min(-1, initial=np.inf)
+        return np.minimum(np.minimum(left, right), corner)
+
+    @property
+    def _corners(self) -> tuple[Floats, Floats]:
+        """Where the corners of all boxes are, each [4 * boxes]."""
+        along = np.multiply.outer((1.0, 1.0, -1.0, -1.0), self.half_length_m)
+        across = np.multiply.outer((1.0, -1.0, 1.0, -1.0), self.half_width_m)
+        x_m = self.x_m + self.cos * along - self.sin * across
+        y_m = self.y_m + self.sin * along + self.cos * across
+        return x_m.reshape(-1), y_m.reshape(-1)
+
     def straight_ahead(self, x_m: Floats, y_m: Floats, yaw_rad: Floats) -> Floats:
         """Metres from each place [...] to where a straight drive first meets a box: 0 inside, +inf if it meets none."""
         if not len(self.x_m):

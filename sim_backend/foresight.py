@@ -133,17 +133,12 @@ class Foresight:
         return Place(*(np.stack(values, axis=-1) for values in zip(*places, strict=True)))
 
     def _allowed(self, near: Obstacles, motion: Motion, linear_m_s: Floats) -> Floats:
-        """The speed ahead that the protective field leaves, as far as three lines straight ahead tell."""
+        """The speed ahead that the protective field leaves."""
         field, base = self._profile.field, self._profile.base
         if field is None:
             return linear_m_s
-        half_m = base.width_m / 2 + field.margin_m
-        cos, sin = np.cos(motion.yaw_rad), np.sin(motion.yaw_rad)
-        met_m = [
-            near.straight_ahead(motion.x_m - side_m * sin, motion.y_m + side_m * cos, motion.yaw_rad)
-            for side_m in (-half_m, 0.0, half_m)
-        ]
-        free_m = np.min(met_m, axis=0) - base.length_m / 2
+        met_m = near.free_ahead(motion.x_m, motion.y_m, motion.yaw_rad, base.width_m / 2 + field.margin_m)
+        free_m = met_m - base.length_m / 2
         slowed = np.where(free_m < field.slow_m, np.minimum(linear_m_s, field.slow_m_s), linear_m_s)
         return np.where(free_m < field.stop_m, 0.0, slowed)
 

@@ -41,12 +41,15 @@ def test_a_camera_that_is_small_already_is_left_alone():
     assert with_small_camera(profile) is profile
 
 
-@pytest.mark.parametrize(("aside_m", "turn"), [(0.0, 0.0), (0.0, 0.3), (0.12, 0.0), (0.5, 0.0)])
-def test_the_protective_field_works_in_what_is_foreseen_as_on_the_robot(aside_m, turn):
-    profile, steps = load_profile("rosbot2"), 10
+@pytest.mark.parametrize(
+    ("aside_m", "turn", "box_deg"),
+    [(0.0, 0.0, 0.0), (0.0, 0.1, 0.0), (0.18, 0.0, 0.0), (0.5, 0.0, 0.0), (0.17, 0.0, 45.0), (0.24, 0.0, 30.0)],
+)
+def test_the_protective_field_works_in_what_is_foreseen_as_on_the_robot(aside_m, turn, box_deg):
+    profile, steps = load_profile("rosbot2"), 16
     world = World(
         description="a box on the way",
-        box=(Box(x_m=1.0, y_m=0.0, length_m=0.4, width_m=0.2),),
+        box=(Box(x_m=1.0, y_m=0.0, yaw_deg=box_deg, length_m=0.3, width_m=0.3),),
         line=Line(pieces=(Piece(straight_m=5.0),)),
         limits=Limits(lost_m=3.0, finish_m=4.0),
     )
