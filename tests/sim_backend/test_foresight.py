@@ -43,7 +43,7 @@ def test_a_camera_that_is_small_already_is_left_alone():
 
 @pytest.mark.parametrize(
     ("aside_m", "turn", "box_deg"),
-    [(0.0, 0.0, 0.0), (0.0, 0.1, 0.0), (0.18, 0.0, 0.0), (0.5, 0.0, 0.0), (0.17, 0.0, 45.0), (0.24, 0.0, 30.0)],
+    [(0.0, 0.0, 0.0), (0.0, 0.1, 0.0), (0.18, 0.0, 0.0), (0.5, 0.0, 0.0), (0.0, 0.0, 45.0), (0.24, 0.0, 30.0)],
 )
 def test_the_protective_field_works_in_what_is_foreseen_as_on_the_robot(aside_m, turn, box_deg):
     profile, steps = load_profile("rosbot2"), 16
