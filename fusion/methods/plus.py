@@ -1,12 +1,11 @@
 """`plus`: LIRA-SPF with what the thesis leaves to future work. Each part can be switched off in `PlusSettings`.
 
 - Pre-fill: before anybody teaches it, the novice learns what the first expert does while the others are quiet, and
-  what active experts agree on. Where they disagree the first drives on, until the human has driven once: from then on
-  the novice does, as in Algorithm 1, since it alone has learned from that.
+  what active experts agree on.
 - Reservation: an expert's label counts only once a second has passed without the human correcting what the expert did.
 - A choice as an answer: instead of driving, the human may give control to an expert for a while.
 - Practice: a novice that was once examined drives as it will alone, and is only corrected.
-- Sureness: where an expert would drive or the human would be called, but the novice says that it knows, it drives.
+- Sureness: where the experts disagree and the novice says that it knows, it drives, and nobody is called.
 
 Its novice is that of `fusion/kernel.py`.
 """
@@ -15,7 +14,6 @@ from collections import deque
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
-from lira.fusion.learning.labels import Label
 from lira.fusion.learning.novice import Novice
 from lira.fusion.methods.base import AsTaught, Choice, Expert, Lesson, Method, Policy, Proposal, Settled
 from lira.fusion.methods.context import Context, MethodSettings
@@ -30,10 +28,9 @@ class PlusSettings(MethodSettings, frozen=True, tag="plus"):
 
     lira: LiraSettings = LiraSettings()
     prefill: int = 60  # labels the experts give before the human is asked
-    shown: bool = True  # once the human has driven, the novice drives where they disagree, before that many, too
     reserve_s: float = 1.0  # an expert's label waits so long for the human's objection
     handover_s: float = 1.0  # an expert that was given control keeps it so long
-    sure: float | None = 0.5  # surer than at all but this share of what the human showed, the novice is not helped
+    sure: float | None = None  # surer than at all but this share of what the human showed, the novice is not helped
     practice: bool = False  # from its first proving run on, the novice drives and the human corrects it
     ask: bool = False  # on unseen layouts it stops and asks where it doubts
 
@@ -50,7 +47,6 @@ class LiraPlus(LiraSpf):
         self._reserve = round(settings.reserve_s / period_s)
         self._handover_steps = round(settings.handover_s / period_s)
         self._gifts = 0
-        self._shown = False  # whether the human has driven
         self._examined = False
         super().__init__(experts, novice, settings.lira, period_s)
 
@@ -59,11 +55,6 @@ class LiraPlus(LiraSpf):
         super().reset()
         self._reserved: deque[Proposal] = deque()
         self._driver, self._left = "", 0
-
-    def remember(self, label: Label) -> None:
-        """Take in a label from before."""
-        super().remember(label)
-        self._shown |= label.source == Driver.HUMAN
 
     @property
     def begins_alone(self) -> bool:
@@ -103,7 +94,7 @@ class LiraPlus(LiraSpf):
         objection = human is not None or (proposal.choice.given and self._left == self._handover_steps)
         dropped = self._drop() if objection else ()
         if human is not None:
-            self._shown, self._left = True, 0
+            self._left = 0
             return replace(super().learn(proposal, human), settled=dropped)
         self._left = max(0, self._left - 1)
         if not self._reserve or proposal.choice.label is None:
@@ -144,15 +135,14 @@ class LiraPlus(LiraSpf):
 
     def _prefill(self, proposal: Proposal) -> Proposal:
         """The first expert drives, or another that alone is active; the human is called where they disagree."""
-        first, a_1 = self.experts[0].name, proposal.experts[0].action
-        choice = choose(None, proposal.experts, proposal.novice, self._consensus)
-        called = choice.call is Call.FEEDBACK
-        knows_more = self._plus.shown and self._shown and self.novice.trained
-        if choice.driver == Driver.NOVICE and not (called and knows_more):
-            choice = replace(choice, driver=first, action=a_1, label=None if called else a_1)
+        first = self.experts[0].name
+        a_1 = proposal.experts[0].action
+        choice = choose(None, proposal.experts, a_1, self._consensus)
+        if choice.driver == Driver.NOVICE:  # nobody is active, or they disagree
+            choice = replace(choice, driver=first, label=a_1 if choice.call is Call.NONE else None)
         elif choice.driver not in (first, Driver.MEAN):
             choice = replace(choice, label=None)
-        return replace(proposal, choice=choice, speed=self.settings.slow_down if called else 1.0)
+        return replace(proposal, choice=choice, speed=self.settings.slow_down if choice.call is Call.FEEDBACK else 1.0)
 
     def _sure(self, features: Features) -> bool:
         """Whether the novice knows what to do here."""

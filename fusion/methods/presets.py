@@ -176,8 +176,6 @@ PLUS = (
     _plus("plus"),
     _plus("plus-no-prefill", approach=PlusSettings(prefill=0)),
     _plus("plus-no-reserve", approach=PlusSettings(reserve_s=0.0)),
-    _plus("plus-no-shown", approach=PlusSettings(shown=False)),
-    _plus("plus-no-sure", approach=PlusSettings(sure=None)),
     _plus("plus-no-weight", learning=_M10),
     _plus("plus-no-mirror", mirrored=False),
     _plus("plus-no-handover", approach=PlusSettings(handover_s=0.0)),
@@ -185,6 +183,7 @@ PLUS = (
     _plus("plus-no-gain", kernel=KernelSettings(gain=1.0)),
     _plus("plus-network", kernel=None),
     _plus("plus-practice", approach=PlusSettings(practice=True)),
+    _plus("plus-sure", approach=PlusSettings(sure=0.25)),
     _plus("plus-ask", approach=PlusSettings(ask=True)),
     _plus("plus-own", syllabus=THESIS),
 )

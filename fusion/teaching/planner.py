@@ -16,7 +16,7 @@ STAGES_S = (0.4, 0.6, 0.8, 0.8)
 STEERING: dict[Style, tuple[float, ...]] = {"bang-bang": (-1.0, 0.0, 1.0), "proportional": (-1.0, -0.5, 0.0, 0.5, 1.0)}
 COMFORT_M = 0.40  # clearance below which closeness costs
 STAY_COST = 0.05  # of turning otherwise than the last plan: a small one lets full steer settle on the line
-SPOT_STAY_COST = 1.0  # after a turn on the spot: who turns to and fro there never gets away
+SPOT_STAY_COST = 1.0  # the same on the spot: who turns to and fro there never gets away
 TOUCH_M = 0.03
 ASKEW_RAD = 1.0  # from here on the robot may be driving the line the wrong way, and progress lost costs
 RETREAT_COST = 3.0  # of each metre: more than to turn round, on the spot or beside the line
@@ -45,8 +45,10 @@ class Planner:
         """Return the first action of the best sequence from `state`."""
         cost = self._cost(state)
         if self._last is not None:  # stay with a plan unless another is clearly better: labels with one mind
-            stay_cost = STAY_COST if self._last[0] > 0.0 else SPOT_STAY_COST
-            cost = cost + stay_cost * np.abs(self._sequences[:, 0, 1] - self._last[1])
+            to_and_fro = (self._sequences[:, 0, 0] == 0.0) & (self._last[0] == 0.0)
+            cost = cost + np.where(to_and_fro, SPOT_STAY_COST, STAY_COST) * np.abs(
+                self._sequences[:, 0, 1] - self._last[1]
+            )
         linear, angular = self._sequences[int(np.argmin(cost)), 0]
         if self._style == "proportional":
             angular = self._blend(cost)

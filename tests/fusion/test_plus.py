@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 from nets import fusion_net
 
-from lira.fusion.learning.labels import Label
 from lira.fusion.learning.novice import LearningSettings, NetworkNovice
 from lira.fusion.log.recorder import Journal
 from lira.fusion.methods.base import Alone, Chooser, Expert
@@ -117,39 +116,6 @@ class TestPrefill:
             proposal, _ = scene.step()
         assert proposal.choice.driver != "camera"
         assert len(scene.shelf.labels) == 8
-
-    def disagreeing(self, *, trained=True, **parts):
-        scene = Scene(PlusSettings(prefill=60, reserve_s=0.0, **parts), trained=trained)
-        scene.warm()
-        scene.camera, scene.lidar = LEFT, RIGHT
-        return scene
-
-    def test_once_the_human_has_driven_the_novice_drives_where_they_disagree(self):
-        scene = self.disagreeing()
-        assert scene.step()[0].choice.driver == "camera"
-        scene.step(human=RIGHT)
-        proposal, lesson = scene.step()
-        assert (proposal.choice.driver, proposal.choice.action) == ("novice", proposal.novice)
-        assert (proposal.choice.call, proposal.speed, lesson.stored) == (Call.FEEDBACK, 0.3, False)
-        scene.camera = scene.lidar = CRUISE
-        scene.warm()
-        assert scene.step()[0].choice.driver == "camera"
-
-    def test_without_that_part_the_first_expert_drives_on(self):
-        scene = self.disagreeing(shown=False)
-        scene.step(human=RIGHT)
-        assert scene.step()[0].choice.driver == "camera"
-
-    def test_a_novice_that_has_not_been_trained_does_not(self):
-        scene = self.disagreeing(trained=False)
-        scene.step(human=RIGHT)
-        assert scene.step()[0].choice.driver == "camera"
-
-    @pytest.mark.parametrize(("source", "driver"), [("human", "novice"), ("lidar", "camera")])
-    def test_what_an_earlier_session_was_shown_by_the_human_counts(self, source, driver):
-        scene = self.disagreeing()
-        scene.method.remember(Label(seen(), RIGHT, source))
-        assert scene.step()[0].choice.driver == driver
 
 
 class TestReservation:

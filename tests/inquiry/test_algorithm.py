@@ -50,12 +50,6 @@ def test_every_row_of_the_algorithm_has_its_lines(experts, human, lines, words):
         assert line.words.startswith(words)
 
 
-def test_in_the_pre_fill_too_the_novice_is_said_to_drive_where_it_was_shown_something():
-    shown = step(APART, choice=Choice(Driver.NOVICE, NOVICE, call=Call.FEEDBACK))
-    assert line_of(shown, PLUS, State(20, 20)).lines == "19 to 21"
-    assert line_of(step(APART, choice=Choice("camera", NOVICE, call=Call.FEEDBACK)), PLUS, State(20, 20)).lines == ""
-
-
 @pytest.mark.parametrize(
     ("moment", "recipe", "novice", "words"),
     [

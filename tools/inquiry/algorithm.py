@@ -36,8 +36,7 @@ def line_of(step: Step, recipe: Recipe | None, novice: State | None) -> Line:
         return _outside(step)
     if choice.given:
         return Line("", f"the human gave {choice.driver} control: its actions are the labels")
-    asks = choice.driver == Driver.NOVICE and choice.call is Call.FEEDBACK  # also in the pre-fill, once it was shown
-    if plus is not None and novice is not None and novice.labels < plus.prefill and not asks:
+    if plus is not None and novice is not None and novice.labels < plus.prefill:
         taught = f"{novice.labels} of {plus.prefill} labels"
         return Line("", f"pre-fill: the experts teach before anybody is asked, {taught} so far")
     if choice.driver == Driver.NOBODY or (novice is not None and novice.steps == 0):

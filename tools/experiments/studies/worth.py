@@ -108,7 +108,7 @@ ABLATION = Worth(
 VARIANTS = Worth(
     {
         "hold": ("hold-mirrored",),
-        "plus": ("plus-ask", "plus-practice"),
+        "plus": ("plus-ask", "plus-practice", "plus-sure"),
         "hg-dagger": ("hg-dagger-trunks", "hg-dagger-mirrored", "hg-dagger-doubt"),
     }
 )
