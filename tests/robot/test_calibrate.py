@@ -112,8 +112,8 @@ def devices(folder, room):
 
 
 def is_late(error):
-    """Whether it ended since the emulated board got no time to answer, as on a busy machine."""
-    return "no_base" in error or "no longer tells where it is" in error
+    """Whether it ended since the emulated devices got no time to answer, as on a busy machine."""
+    return any(words in error for words in ("no_base", "no longer tells where it is", "the lidar shows nothing"))
 
 
 def calibrated(words, room, capsys):
@@ -227,7 +227,7 @@ def test_a_kill_and_a_lost_terminal_end_it_with_wheels_and_lidar_still(tmp_path,
         for _ in range(ATTEMPTS):
             room.put_back()
             with ChildProcess("the calibration", command, tmp_path / "calibrate.log") as child:
-                until_s = time.monotonic() + 20.0
+                until_s = time.monotonic() + 60.0
                 while room.true[0] < 0.05 and child.status() is None:
                     assert time.monotonic() < until_s, child.output()
                     time.sleep(0.01)

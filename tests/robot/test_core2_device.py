@@ -171,9 +171,9 @@ def test_motors_are_cut_and_given_back(tmp_path):
 
 def test_time_is_answered_so_that_the_board_stays(tmp_path, monkeypatch):
     monkeypatch.setattr("lira.sim_backend.emulators.core2.ASK_TIME_S", 0.1)
-    monkeypatch.setattr("lira.sim_backend.emulators.core2.GIVE_UP_S", 0.5)
+    monkeypatch.setattr("lira.sim_backend.emulators.core2.GIVE_UP_S", 1.5)
     with Bench(tmp_path / "base") as bench:
-        time.sleep(1.0)
+        time.sleep(2.0)
         assert bench.unit.configured
         assert bench.base.answers
         assert bench.base.counts.negotiations == 1

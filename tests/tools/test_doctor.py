@@ -27,6 +27,7 @@ from lira.tools.launch.processes import ChildProcess, free_port, lira_command
 
 PATIENT = Patient(load_profile("rosbot2"))
 MACHINE = [check for check in CHECKS if not check.wanted]
+LOOKS = 4
 ROOM = ("--profile", "rosbot2", "--world", "room", "--renderer", "sketch")
 
 
@@ -156,7 +157,10 @@ def test_devices_are_looked_at_live_and_a_picture_is_kept(tmp_path):
     with ChildProcess("the devices", command, tmp_path / "twin.log") as twin:
         line = twin.wait_ready("open them with: lira robot", 60.0)
         words = re.search(r"lira robot (.*)", line)[1].split()
-        status, found = diagnose(tmp_path / "found.json", *words, "--out", str(picture), "--seconds", "2")
+        for _ in range(LOOKS):  # a busy machine's devices are late: then they are looked at again
+            status, found = diagnose(tmp_path / "found.json", *words, "--out", str(picture), "--seconds", "2")
+            if status == 0:
+                break
     assert status == 0, found
     assert "RPLIDAR" in found["lidar"][0]["what"]
     assert found["lidar"][1]["values"]["rate_hz"] > 3.0

@@ -201,19 +201,22 @@ SIZES = {
 }
 
 
-@pytest.mark.parametrize("size", SIZES)
-def test_on_every_screen_all_that_is_needed_is_in_reach(page, size):
-    width, height = SIZES[size]
-    words = {"width": width, "height": height, "deviceScaleFactor": 1, "mobile": "phone" in size}
-    page.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", words)
+NEEDED = ("who", "now", "stop", "deadman", "stick", "turbo", "pause", "drive", "camera")
+BOXES = "return arguments[0].map((name) => document.getElementById(name).getBoundingClientRect().toJSON());"
+
+
+def test_on_every_screen_all_that_is_needed_is_in_reach(page):
+    sit(page)
     try:
-        sit(page)
-        for name in ("who", "now", "stop", "deadman", "stick", "turbo", "pause", "drive", "camera"):
-            box = page.execute_script(f"return document.getElementById('{name}').getBoundingClientRect().toJSON()")
-            assert box["width"] > 20, name
-            assert box["height"] > 10, name
-            assert -1 <= box["left"] <= box["right"] <= width + 1, name
-            assert -1 <= box["top"] <= box["bottom"] <= height + 1, name
+        for size, (width, height) in SIZES.items():
+            words = {"width": width, "height": height, "deviceScaleFactor": 1, "mobile": "phone" in size}
+            page.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", words)
+            wait_until(lambda: page.execute_script("return [innerWidth, innerHeight]") == [width, height])  # noqa: B023
+            for name, box in zip(NEEDED, page.execute_script(BOXES, NEEDED), strict=True):
+                assert box["width"] > 20, (size, name)
+                assert box["height"] > 10, (size, name)
+                assert -1 <= box["left"] <= box["right"] <= width + 1, (size, name)
+                assert -1 <= box["top"] <= box["bottom"] <= height + 1, (size, name)
     finally:
         page.execute_cdp_cmd("Emulation.clearDeviceMetricsOverride", {})
 
