@@ -14,6 +14,14 @@ class Futures(Protocol):
     """Imagined drives, each array [N, T]; what a world has no line for is nan."""
 
     @property
+    def x_m(self) -> NDArray[np.float64]:
+        """Where the robot is, in the frame of its `CourseState`."""
+
+    @property
+    def y_m(self) -> NDArray[np.float64]:
+        """The same, to the left."""
+
+    @property
     def clearance_m(self) -> NDArray[np.float64]:
         """Distance to the nearest box."""
 

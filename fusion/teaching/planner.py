@@ -18,6 +18,7 @@ COMFORT_M = 0.40  # clearance below which closeness costs
 STAY_COST = 0.05  # of turning otherwise than the last plan: a small one lets full steer settle on the line
 SPOT_STAY_COST = 1.0  # the same on the spot: who turns to and fro there never gets away
 TOUCH_M = 0.03
+STILL_M = 0.005  # within a step: it stands
 ASKEW_RAD = 1.0  # from here on the robot may be driving the line the wrong way, and progress lost costs
 RETREAT_COST = 3.0  # of each metre: more than to turn round, on the spot or beside the line
 
@@ -34,7 +35,6 @@ class Planner:
         self._follow = float(follow_line)
         self._sequences = action_sequences(style, period_s) * (1.0, steer)
         self._effort = np.abs(self._sequences[:, :, 1]).mean(axis=1)
-        self._standing = (self._sequences[:, :, 0] < 0.5).mean(axis=1)
         self.reset()
 
     def reset(self) -> None:
@@ -70,7 +70,7 @@ class Planner:
             + self._follow * (3.0 * (lateral**2).mean(axis=1) + 0.2 * lateral[:, -1] + 0.3 * heading)
             + self._follow * RETREAT_COST * _retreat_m(futures, state)
             + 0.15 * self._effort
-            + 8.0 * self._standing
+            + 8.0 * _standing(futures, state)
         )
         return cost
 
@@ -80,6 +80,14 @@ class Planner:
         side = np.sign(turns[int(np.argmin(cost))])
         weight = np.exp(-(cost - cost.min()) / 0.05) * (turns * side >= 0.0)
         return float(np.average(turns, weights=weight))
+
+
+def _standing(futures: Futures, state: CourseState) -> NDArray[np.float64]:
+    """Share of its time that the robot stands in each future, [N]: as planned, or held by its protective field."""
+    x_m = np.diff(futures.x_m, axis=1, prepend=state.x_m)
+    y_m = np.diff(futures.y_m, axis=1, prepend=state.y_m)
+    still: NDArray[np.float64] = (np.hypot(x_m, y_m) < STILL_M).mean(axis=1)
+    return still
 
 
 def _retreat_m(futures: Futures, state: CourseState) -> NDArray[np.float64]:

@@ -7,8 +7,9 @@ import pytest
 
 from lira.fusion.control import to_twist
 from lira.fusion.teaching.planner import STAGES_S, Planner, action_sequences
-from lira.hal.messages import Command, Episode
+from lira.hal.messages import STOP, Command, Episode
 from lira.hal.profile import load_profile
+from lira.hal.safety.governed import govern
 from lira.sim_backend.foresight import Foresight
 from lira.sim_backend.twin import Twin
 from lira.sim_backend.world import Box, Limits, Line, Piece, World
@@ -153,3 +154,21 @@ def test_a_hand_turns_a_nimble_robot_no_faster_than_it_is_told():
     )
     assert abs(full) == 1.0
     assert abs(gentle) == pytest.approx(0.3)
+
+
+@pytest.mark.parametrize("lateral_m", [0.1, -0.2])
+@pytest.mark.parametrize("yaw_rad", [0.0, 0.5])
+def test_a_robot_that_its_field_holds_before_a_box_is_turned_until_it_gets_past(lateral_m, yaw_rad):
+    slow = load_profile("rosbot2")
+    planner = Planner(Foresight(slow, ONE_BOX), "bang-bang", slow.period_s, follow_line=True, steer=0.3)
+    twin = Twin(slow, ONE_BOX)
+    with govern(twin) as robot:
+        twin.reset(Episode(start_m=BOX_M - 0.38, lateral_m=lateral_m, yaw_rad=yaw_rad))
+        robot.read()
+        robot.drive(Command(STOP, robot.now()))
+        while (state := twin.state()).progress_m < BOX_M + 0.3:
+            assert state.stamp_s < 40.0
+            robot.read()
+            robot.drive(Command(to_twist(planner.plan(state), slow.base), robot.now()))
+            robot.wait(robot.now() + slow.period_s)
+        assert not twin.state().collided

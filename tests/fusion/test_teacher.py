@@ -30,6 +30,8 @@ def straight(features):
 
 @dataclass
 class Futures:
+    x_m: np.ndarray
+    y_m: np.ndarray
     clearance_m: np.ndarray
     lateral_m: np.ndarray
     heading_error_rad: np.ndarray
@@ -51,7 +53,9 @@ class Crystal:
 
     def imagine(self, state, actions, period_s):
         lateral = 3.0 - np.cumsum(actions[:, :, 1], axis=1) * period_s
-        return Futures(np.full(lateral.shape, 1.0), lateral, np.zeros(lateral.shape), np.zeros(lateral.shape))
+        x_m = state.x_m + np.cumsum(actions[:, :, 0], axis=1) * period_s
+        none = np.zeros(lateral.shape)
+        return Futures(x_m, none, np.full(lateral.shape, 1.0), lateral, none, none)
 
 
 def at(step):
