@@ -57,6 +57,15 @@ def lira(capsys, *words):
     return status, capsys.readouterr()
 
 
+def test_the_folder_of_a_run_stands_for_its_log(folder, tmp_path, capsys):
+    assert lira(capsys, "list", folder)[1].out == lira(capsys, "list", folder / LABELS)[1].out
+    empty = tmp_path / "empty"
+    empty.mkdir()
+    status, said = lira(capsys, "list", empty)
+    assert status == 2
+    assert f"{empty / LABELS}" in said.err
+
+
 def test_the_list_says_what_became_of_each_label(folder, capsys):
     status, said = lira(capsys, "list", folder / LABELS)
     assert status == 0

@@ -7,7 +7,7 @@ and the damaged one stays beside it.
 
 examples:
   lira labels list runs/mine/labels.lira               all labels, with the numbers by which the others know them
-  lira labels undo runs/mine/labels.lira               take back the last intervention
+  lira labels undo runs/mine                           take back the last intervention; the folder will do
   lira labels undo FILE --number 12 40-43              ... these labels
   lira labels undo FILE --source camera --from 30 --to 35   ... what the camera expert showed in these seconds
   lira labels redo FILE --number 12                    learn it again
@@ -28,6 +28,7 @@ from typing import TYPE_CHECKING, Any
 
 from lira.hal.errors import ConfigError
 from lira.tools.options import add_json
+from lira.tools.runs.names import LABELS
 
 if TYPE_CHECKING:
     from lira.fusion.log.label_salvage import Survey
@@ -40,7 +41,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
     add = parser.add_argument
     add("what", choices=tuple(DOES), help="what to do")
-    add("file", type=Path, nargs="+", metavar="FILE", help="the log; for merge two of them")
+    add("file", type=_log_of, nargs="+", metavar="FILE", help="the log, or its run's folder; for merge two of them")
     add("--number", type=numbers, nargs="+", default=(), metavar="N", help="labels by number, like 12 or 40-43")
     add("--source", help="undo, redo: labels of the human, or of an expert by name")
     add("--from", type=float, dest="from_s", metavar="S", help="undo, redo: from this time of the robot's clock on")
@@ -53,6 +54,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     add("--profile", help="check: whose labels they are, if the file does not say (default: the known robots)")
     add_json(parser)
+
+
+def _log_of(name: str) -> Path:
+    """The log of labels: the file itself, or that in a run's folder."""
+    path = Path(name)
+    return path / LABELS if path.is_dir() else path
 
 
 def run(args: argparse.Namespace) -> int:
