@@ -8,7 +8,7 @@ import numpy as np
 
 from lira.hal.bus.sensors import Stamped
 from lira.hal.messages import Action, Command, CourseState, Twist
-from lira.hal.profile import RobotProfile
+from lira.hal.profile import Field, RobotProfile
 from lira.sim_backend import drive
 from lira.sim_backend.catalogue import load_world
 from lira.sim_backend.course import Course, Obstacles, Place, footprint_radius_m
@@ -87,7 +87,7 @@ class Foresight:
             linear, angular = policy(twin.sense) if first is None else first
             first = None
             twist = Twist(linear * base.max_linear_m_s, angular * base.max_angular_rad_s)
-            twin.drive(Command(self._allowed_one(twin.state(), twist), twin.now()))
+            twin.drive(Command(self._allowed_one(states[-1] if states else state, twist), twin.now()))
             twin.wait(twin.now() + period_s)
             states.append(twin.state())
             if states[-1].collided or states[-1].lost or ends(states[-1]):
@@ -112,12 +112,12 @@ class Foresight:
 
     def _follow(self, near: Obstacles, motion: Motion, targets: Floats, duration_s: float) -> Motion:
         """Drive robots [N] at velocities [N, K, 2], each held so long: arrays [N, K]."""
-        base = self._profile.base
-        if self._profile.field is None:
+        base, field = self._profile.base, self._profile.field
+        if field is None:
             return drive.path(base, motion, targets[:, :, 0], targets[:, :, 1], duration_s)
         moments = []
         for linear, angular in targets.transpose(1, 2, 0):
-            motion = drive.step(base, motion, self._allowed(near, motion, linear), angular, duration_s)
+            motion = drive.step(base, motion, self._allowed(field, near, motion, linear), angular, duration_s)
             moments.append(motion)
         return drive.in_time(moments)
 
@@ -132,11 +132,9 @@ class Foresight:
             places.append((place.progress_m, place.lateral_m, place.heading_error_rad))
         return Place(*(np.stack(values, axis=-1) for values in zip(*places, strict=True)))
 
-    def _allowed(self, near: Obstacles, motion: Motion, linear_m_s: Floats) -> Floats:
-        """The speed ahead that the protective field leaves."""
-        field, base = self._profile.field, self._profile.base
-        if field is None:
-            return linear_m_s
+    def _allowed(self, field: Field, near: Obstacles, motion: Motion, linear_m_s: Floats) -> Floats:
+        """The speed ahead that the protective field leaves, as `limit_speed` has it for one robot."""
+        base = self._profile.base
         met_m = near.free_ahead(motion.x_m, motion.y_m, motion.yaw_rad, base.width_m / 2 + field.margin_m)
         free_m = met_m - base.length_m / 2
         slowed = np.where(free_m < field.slow_m, np.minimum(linear_m_s, field.slow_m_s), linear_m_s)
@@ -144,9 +142,10 @@ class Foresight:
 
     def _allowed_one(self, state: CourseState, wanted: Twist) -> Twist:
         """What the protective field leaves of a twist."""
-        if self._profile.field is None or wanted.linear_m_s <= 0.0:
+        field = self._profile.field
+        if field is None or wanted.linear_m_s <= 0.0:
             return wanted
-        linear = self._allowed(self.course.obstacles, spread(state, 1), np.array([wanted.linear_m_s]))
+        linear = self._allowed(field, self.course.obstacles, spread(state, 1), np.array([wanted.linear_m_s]))
         return Twist(float(linear[0]), wanted.angular_rad_s)
 
     def close(self) -> None:
