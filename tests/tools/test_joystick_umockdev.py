@@ -132,7 +132,7 @@ class Rig:
         zeros = list(itertools.takewhile(lambda r: r.message == STOP, reversed(sent)))
         assert 8 <= len(zeros) <= 18, self.process.output()
         assert {r.attachment.released for r in zeros} == {released}
-        assert zeros[0].attachment.time_s - zeros[-1].attachment.time_s == pytest.approx(0.5, abs=0.25)
+        assert zeros[0].attachment.time_s - zeros[-1].attachment.time_s == pytest.approx(0.5, abs=0.15)
         time.sleep(0.3)
         assert len(self.teleop.all()) == len(sent)
 
