@@ -9,7 +9,7 @@ from typing import Annotated, Literal
 import msgspec
 
 from lira.hal.bus.bus import Bus
-from lira.hal.bus.topics import ESTOP_LOOK, ESTOP_PRESS, ESTOP_RELEASE
+from lira.hal.bus.topics import ESTOP_LOOK, ESTOP_PRESS, ESTOP_RELEASE, INFO
 from lira.hal.errors import BusError, CodecError
 from lira.hal.messages.bounds import LARGEST
 from lira.hal.messages.codec import decode_json
@@ -18,6 +18,7 @@ from lira.hal.profile import RobotProfile
 REALTIME: Literal["realtime"] = "realtime"
 LOCKSTEP: Literal["lockstep"] = "lockstep"
 ANSWER_S = 2.0
+INFO_S = 5.0
 
 Epoch = Annotated[int, msgspec.Meta(ge=0)]  # msgspec keeps integers within 64 bits
 Moment = Annotated[float, msgspec.Meta(ge=-LARGEST, le=LARGEST)]
@@ -43,6 +44,11 @@ def info_from_json(data: bytes) -> Info:
     except CodecError as error:
         raise BusError(f"the robot says what is not understood: {error}", "Run one version on both sides.") from error
     return info
+
+
+def ask_info(bus: Bus, timeout_s: float = INFO_S) -> Info:
+    """Ask a robot who it is. Raises `BusError` if it does not answer."""
+    return info_from_json(bus.ask(INFO, timeout_s=timeout_s))
 
 
 def reset_time(answer: bytes) -> float:

@@ -6,8 +6,7 @@ from collections.abc import Callable, Iterator
 from typing import NamedTuple
 
 from lira.hal.bus.bus import Bus
-from lira.hal.bus.services import LOCKSTEP, Info, info_from_json
-from lira.hal.bus.topics import INFO
+from lira.hal.bus.services import LOCKSTEP, Info, ask_info
 from lira.tools.joystick.client import TeleopClient
 from lira.tools.launch.lifetime import CLOSE_S, stop_or_interrupt
 
@@ -34,7 +33,7 @@ def beside(name: str, endpoint: str) -> Iterator[Beside]:
         bus = Bus(name, connect=endpoint)
         stack.callback(bus.close, CLOSE_S)
         stop = stack.enter_context(stop_or_interrupt())
-        info = info_from_json(bus.ask(INFO, timeout_s=ANSWER_S))
+        info = ask_info(bus, ANSWER_S)
         watch = Bus(name, connect=endpoint, watch=True)
         stack.callback(watch.close, CLOSE_S)
         yield Beside(bus, watch, info, stop)

@@ -12,8 +12,8 @@ from collections.abc import Callable
 from contextlib import ExitStack
 
 from lira.hal.bus.bus import Bus
-from lira.hal.bus.services import LOCKSTEP, info_from_json
-from lira.hal.bus.topics import APPLIED, INFO
+from lira.hal.bus.services import LOCKSTEP, ask_info
+from lira.hal.bus.topics import APPLIED
 from lira.hal.clock import ClockEstimate
 from lira.hal.errors import ConfigError
 from lira.hal.messages import Reason
@@ -34,7 +34,7 @@ class Offer:
     """One robot in one graph."""
 
     def __init__(self, bus: Bus, node: RosNode) -> None:
-        info = info_from_json(bus.ask(INFO, timeout_s=FIND_S))
+        info = ask_info(bus, FIND_S)
         if info.mode == LOCKSTEP:
             raise ConfigError("a robot in lockstep is no robot of ROS's", "Run it in real time.")
         arena = bytes(info.arena) != b"null"

@@ -95,8 +95,7 @@ def behind(args: argparse.Namespace, moment: "Moment") -> list[str]:
 def now(args: argparse.Namespace) -> "Moment":
     """The moment at hand."""
     from lira.hal.bus.bus import Bus
-    from lira.hal.bus.services import info_from_json
-    from lira.hal.bus.topics import INFO
+    from lira.hal.bus.services import ask_info
     from lira.tools.cli import version
     from lira.tools.inquiry.moment import moment_now
     from lira.tools.launch.lifetime import CLOSE_S
@@ -104,7 +103,7 @@ def now(args: argparse.Namespace) -> "Moment":
 
     bus = Bus(args.name, connect=args.connect, watch=True)
     try:
-        info = info_from_json(bus.ask(INFO))
+        info = ask_info(bus)
         began_ns = time.time_ns()
         return moment_now(bus, Head(bus.robot, version(), 0, began_ns, info), HEARD_S)
     finally:
