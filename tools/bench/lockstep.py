@@ -22,7 +22,8 @@ from lira.fusion.log.run_log import RunWriter
 from lira.fusion.methods.base import Method
 from lira.fusion.methods.presets import METHODS
 from lira.hal.bus.topics import DECISION
-from lira.hal.client.remote import RemoteArena, RemoteRobot, connect
+from lira.hal.client.connect import connect
+from lira.hal.client.remote import RemoteArena, RemoteRobot
 from lira.hal.messages import Episode, Phase
 from lira.tools.bench import Row
 from lira.tools.launch.processes import ChildProcess, free_port, lira_command
@@ -82,7 +83,7 @@ def drive(robot: RemoteRobot, layout: int, folder: Path) -> dict[str, float]:
             journal = Journal(
                 keep=log.append, write=record.write, publish=lambda decision: decisions.put(decision, robot.now())
             )
-            loop = ControlLoop(robot, truth=RemoteArena(robot).state)
+            loop = ControlLoop(robot, truth=robot.state)
             loop.arm()
             drive_until(WARM_UP_S, robot, layout, loop, method, journal)
             began = time.perf_counter(), robot.now()
@@ -107,7 +108,6 @@ def drive_until(
     journal: Journal,
 ) -> None:
     """Drive until the robot's clock says so; after a crash or at the end it is put down anew."""
-    arena = RemoteArena(robot)
     while robot.now() < end_s:
         step = loop.step(method)
         if step is None:
@@ -116,5 +116,5 @@ def drive_until(
         state = step.state
         if state is not None and (state.collided or state.lost or state.finished):
             start_m = 0.0 if state.finished else max(state.progress_m, 0.0) + PUT_ON_M
-            arena.reset(Episode(layout, start_m=start_m))
+            RemoteArena(robot).reset(Episode(layout, start_m=start_m))
             method.reset()

@@ -23,7 +23,7 @@ import numpy as np
 from lira.hal.bus.bus import Bus
 from lira.hal.bus.reader import Reader
 from lira.hal.bus.topics import APPLIED
-from lira.hal.client.remote import RemoteRobot
+from lira.hal.client.connect import connect
 from lira.hal.errors import BusError
 from lira.hal.messages import HELD, STOP, Applied, Command, Source, Twist
 from lira.tools.bench import Row
@@ -173,9 +173,8 @@ def bus_of(name: str, endpoint: str, *, watch: bool = False) -> Iterator[Bus]:
 @contextmanager
 def policy(name: str, endpoint: str) -> Iterator[None]:
     """Something that drives at the robot's control rate."""
-    with bus_of(name, endpoint) as bus:
-        robot, stop = RemoteRobot(bus), threading.Event()
-        robot.open()
+    with connect(endpoint, name) as robot:
+        stop = threading.Event()
 
         def drive() -> None:
             go = STOP
@@ -187,7 +186,6 @@ def policy(name: str, endpoint: str) -> Iterator[None]:
 
         with running(drive, stop):
             yield
-        robot.close()
 
 
 @contextmanager

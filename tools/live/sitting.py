@@ -58,7 +58,7 @@ def sit(args: argparse.Namespace, plan: Plan, robot: RemoteRobot, rules: Rules, 
         journal = Journal(keep=room.keep, write=record.write, publish=publish)
         room.go_on(journal.ledger)
         hand = stack.enter_context(hand_of(args))
-        truth = None if arena is None else robot.link.state
+        truth = None if arena is None else robot.state
         loop = ControlLoop(robot, truth=truth)
         board = Board(
             rules.person, room.before, journal.ledger, robot.now, lambda state: sessions.put(state, robot.now()), say

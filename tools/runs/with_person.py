@@ -50,7 +50,7 @@ def learn_from_person(
             journal = Journal(keep=log.append, write=record.write, publish=publish)
             if (newest := before.newest) is not None:
                 journal.ledger.go_on(newest.labels, newest.interventions, newest.calls, before.account)
-            loop = ControlLoop(robot, truth=None if robot.arena is None else robot.link.state)
+            loop = ControlLoop(robot, truth=None if robot.arena is None else robot.state)
             began_s = robot.now()
             with stop_or_interrupt() as stop, request_line(robot, args) as line, hand_of(args) as hand:
                 service = OperatorService(

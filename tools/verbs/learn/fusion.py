@@ -92,7 +92,7 @@ def add_teaching(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Learn until done or told to stop. Exit status 1 if the novice did not drive alone as it should."""
     from lira.fusion.inference.threads import one_thread
-    from lira.hal.client.remote import connect
+    from lira.hal.client.connect import connect
     from lira.tools.cli import require
 
     plan = plan_of(args)

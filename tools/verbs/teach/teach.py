@@ -91,7 +91,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Hold the session, and leave a report."""
     from lira.fusion.inference.threads import one_thread
-    from lira.hal.client.remote import connect
+    from lira.hal.client.connect import connect
     from lira.tools.cli import require
     from lira.tools.launch.lifetime import CLOSE_S
     from lira.tools.live.rules import Rules
