@@ -102,6 +102,13 @@ class Preset(msgspec.Struct, frozen=True):
         probes = isinstance(self.approach, LazyDaggerSettings | ThriftyDaggerSettings)
         return ("torch",) if self.kernel is None or probes else ()
 
+    @property
+    def knows_experts(self) -> bool:
+        """Whether anything of the experts goes into it: what they do, their trunks, what they teach in a warm start."""
+        asks_none = isinstance(self.approach, Rival) and not isinstance(self.approach, SwitchingSettings)
+        sees_alone = self.trunks == "scratch" and self.kernel is None
+        return not (asks_none and sees_alone and not self.warm)
+
     def starting(self, who: str) -> "Preset":
         """Return the same with another driver before the first training step. Raises `ConfigError`."""
         return msgspec.structs.replace(self, approach=self.approach.starting(who))

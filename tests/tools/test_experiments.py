@@ -3,8 +3,10 @@
 import numpy as np
 import psutil
 import pytest
+from msgspec.structs import replace
 from short_trials import short_trial, timeless, write_world
 
+from lira.fusion.methods.presets import METHODS
 from lira.hal.errors import StorageError
 from lira.tools.cli import main
 from lira.tools.experiments.effort.statistics import bootstrap, iqm, median_interval, paired_ratios
@@ -12,6 +14,7 @@ from lira.tools.experiments.playing.kept import kept
 from lira.tools.experiments.playing.pools import Here
 from lira.tools.experiments.playing.runner import run_trials
 from lira.tools.experiments.studies.compare import ratios, summary
+from lira.tools.experiments.trial import play
 
 
 @pytest.fixture
@@ -63,6 +66,32 @@ def test_trials_do_not_depend_on_the_number_of_workers_and_resume(world, tmp_pat
     expected = paired_ratios([alone[1].result.human_labels], [alone[0].result.human_labels])[0]
     assert pair["human_labels"]["median"] == pytest.approx(expected)
     assert pair["human_labels"]["censored"] == int(not all(each.result.converged for each in alone))
+
+
+def test_who_knows_no_experts_is_played_once_for_all_pairs_of_them(world, tmp_path):
+    alone = replace(short_trial(world), method=METHODS["hg-dagger"])
+    elsewhere = replace(alone, experts="passage")
+    assert timeless(play(elsewhere)) == replace(timeless(play(alone)), trial=elsewhere)  # so that once is enough
+
+    played = []
+
+    def pool(trials):
+        played.extend(trials)
+        return Here(1)(trials)
+
+    outcomes = run_trials([alone, elsewhere], tmp_path, pool)
+    assert played == [alone]
+    assert [outcome.trial for outcome in outcomes] == [alone, elsewhere]
+    assert outcomes[1] == replace(outcomes[0], trial=elsewhere)
+    assert run_trials([elsewhere], tmp_path, pool) == outcomes[1:]
+    assert played == [alone]
+
+
+def test_whose_outcome_depends_on_the_experts_is_known():
+    alone = {name for name, method in METHODS.items() if not method.knows_experts}
+    assert {"hg-dagger", "hg-dagger-m10", "cloning", "thrifty-dagger", "iwr-fresh"} <= alone
+    others = {"hold-scratch", "plus", "switching", "hg-dagger-trunks", "hg-dagger-warm", "hg-dagger-kernel"}
+    assert not alone & others
 
 
 def test_an_outcome_that_is_damaged_is_named(world, tmp_path):

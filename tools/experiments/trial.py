@@ -53,6 +53,11 @@ class Trial(msgspec.Struct, frozen=True):
         return self.experts or task_of(self.world)
 
     @property
+    def as_played(self) -> "Trial":
+        """The trial that is played for this one and all that come out the same: who knows no experts, with any pair."""
+        return self if self.method.knows_experts else msgspec.structs.replace(self, experts=None)
+
+    @property
     def profile(self) -> RobotProfile:
         """The robot of the world's task, at this trial's full speed; without protective field, as the thesis's was."""
         profile = msgspec.structs.replace(load_profile(TASKS[task_of(self.world)].profile), field=None)

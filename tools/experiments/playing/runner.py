@@ -20,12 +20,15 @@ Pool = Callable[[Sequence[Trial]], Iterator[Outcome]]
 def run_trials(trials: Sequence[Trial], folder: Path, pool: Pool) -> list[Outcome]:
     """Return the outcomes in the order of the trials: read where the folder has them, else played now.
 
-    An outcome of other code or other experts is played again. Progress goes to standard error. Raises `StorageError`.
+    An outcome of other code or other experts is played again, and none twice that differs in experts nobody asks.
+    Progress goes to standard error. Raises `StorageError`.
     """
-    prints = {trial: fingerprint(trial.world, trial.pair, trial.method.approach.source()) for trial in trials}
+    played_as = {trial: trial.as_played for trial in trials}
+    different = list(dict.fromkeys(played_as.values()))
+    prints = {trial: fingerprint(trial.world, trial.pair, trial.method.approach.source()) for trial in different}
     done: dict[Trial, Outcome] = {}
     outdated = 0
-    for trial in trials:
+    for trial in different:
         outcome = kept(trial, folder)
         if outcome is None:
             continue
@@ -35,14 +38,14 @@ def run_trials(trials: Sequence[Trial], folder: Path, pool: Pool) -> list[Outcom
             outdated += 1
     if outdated:
         print(f"{outdated} kept trials are of other code or other experts: played again", file=sys.stderr, flush=True)
-    missing = [trial for trial in dict.fromkeys(trials) if trial not in done]
-    with Bar(len(trials), len(trials) - len(missing)) as bar:
+    missing = [trial for trial in different if trial not in done]
+    with Bar(len(different), len(done)) as bar:
         for played in pool(missing) if missing else ():
             outcome = msgspec.structs.replace(played, fingerprint=prints[played.trial])
             keep(outcome, folder)
             done[outcome.trial] = outcome
             bar.note(outcome)
-    return [done[trial] for trial in trials]
+    return [msgspec.structs.replace(done[played_as[trial]], trial=trial) for trial in trials]
 
 
 class Bar:
