@@ -10,7 +10,6 @@ from threading import Event
 from types import TracebackType
 from typing import Self
 
-from lira.fusion.control import ControlLoop
 from lira.fusion.log.recorder import Journal
 from lira.fusion.log.run_log import LapRecord, Record
 from lira.fusion.methods.base import Method
@@ -65,11 +64,8 @@ class Exam:
 
     def _run(self) -> None:
         with simulate(self._world, self._profile, renderer=quickest(self._world)) as robot:
-            loop = ControlLoop(robot, truth=robot.arena.state)
             alone = self._method.alone(Phase.UNSEEN)
-            session = Session(robot, robot.arena, loop, self._journal, self._method, lambda _: alone)
-            loop.arm()
-            session.show(self._left())
+            Session(robot, robot.arena, self._journal, self._method, lambda _: alone).show(self._left())
 
     def _left(self) -> Iterator[Drive]:
         for drive in self._drives:

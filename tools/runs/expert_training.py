@@ -53,9 +53,7 @@ def train_expert(kind: str, task: str, profile: RobotProfile, seed: int, path: P
         simulate(world, profile, seed=seed, renderer=quickest(world)) as robot,
         closing(ScriptedTeacher(Foresight(profile, world), profile, course.teacher, seed)) as teacher,
     ):
-        loop = ControlLoop(robot, truth=robot.arena.state)
-        session = Session(robot, robot.arena, loop, Journal(write=telling(tell)), HgDagger(novice))
-        loop.arm()
+        session = Session(robot, robot.arena, Journal(write=telling(tell)), HgDagger(novice))
         proven = session.teach(Anew(course, seed) if course.proofs else Same(course.drives), teacher, course.laps)
     if not proven:
         asked = f"{course.proofs} fresh laps in a row" if course.proofs else "the lap that was taught"
