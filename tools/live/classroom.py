@@ -17,7 +17,8 @@ from lira.hal.messages import Driver
 from lira.hal.profile import RobotProfile
 from lira.tools.live.before import days_before
 from lira.tools.runs.build import NewTrainer
-from lira.tools.runs.folder import LABELS, RECORD, snapshot
+from lira.tools.runs.folder import snapshot
+from lira.tools.runs.names import LABELS, RECORD
 from lira.tools.runs.plan import Plan, build_traced
 from lira.tools.runs.progress import Publish, Say
 

@@ -23,7 +23,8 @@ from lira.tools.live.session import LiveSession
 from lira.tools.operator.voice import explain
 from lira.tools.recording.beside import recorder_beside
 from lira.tools.runs.course import Course
-from lira.tools.runs.folder import LABELS, RECORD, in_the_log
+from lira.tools.runs.folder import in_the_log
+from lira.tools.runs.names import LABELS, RECORD
 from lira.tools.runs.plan import Plan
 from lira.tools.runs.progress import Say
 from lira.tools.runs.reach import FLOOR, hand_of, reports_of, request_line

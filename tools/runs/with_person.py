@@ -18,7 +18,8 @@ from lira.tools.live.before import days_before
 from lira.tools.operator.voice import explain
 from lira.tools.recording.beside import recorder_beside
 from lira.tools.runs.build import NewTrainer
-from lira.tools.runs.folder import LABELS, RECORD, snapshot
+from lira.tools.runs.folder import snapshot
+from lira.tools.runs.names import LABELS, RECORD
 from lira.tools.runs.plan import Plan, build_traced
 from lira.tools.runs.progress import Publish, Say
 from lira.tools.runs.reach import PAUSED, hand_of, request_line, restarter, world_of

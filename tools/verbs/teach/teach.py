@@ -181,9 +181,10 @@ def conclude(folder: Path, passed: bool | None, shown_as: str) -> int:
     """Write the report, and say where it is and what to do with it."""
     from lira.tools.output.label_words import learned_words
     from lira.tools.output.table import format_table
-    from lira.tools.report import RECORD, write_report
+    from lira.tools.report import write_report
     from lira.tools.report.digest import load_run
     from lira.tools.report.laps import COLUMNS, lap_cells
+    from lira.tools.runs.names import RECORD
 
     recorded = load_run(folder / RECORD)
     print(f"\n{format_table(COLUMNS, [lap_cells(lap) for lap in recorded.laps])}\n")
