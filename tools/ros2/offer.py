@@ -14,6 +14,7 @@ from contextlib import ExitStack
 from lira.hal.bus.bus import Bus
 from lira.hal.bus.services import LOCKSTEP, ask_info
 from lira.hal.bus.topics import APPLIED
+from lira.hal.client.connect import on_bus
 from lira.hal.clock import ClockEstimate
 from lira.hal.errors import ConfigError
 from lira.hal.messages import Reason
@@ -89,8 +90,6 @@ def offer(robot: str, address: str, graph: Graph, stop: threading.Event, ready: 
             insecure=True,  # what is not on this machine was asked for (`graph_of`)
         )
         held.callback(node.close)
-        bus = Bus(robot, connect=address)
-        held.callback(bus.close)
-        offered = Offer(bus, node)
+        offered = Offer(held.enter_context(on_bus(address, robot)), node)
         ready()
         offered.run(stop)

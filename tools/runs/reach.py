@@ -7,10 +7,10 @@ from contextlib import contextmanager
 import msgspec
 
 from lira.fusion.operator_service import RequestLine
-from lira.hal.bus.bus import Bus
 from lira.hal.bus.services import LOCKSTEP
 from lira.hal.bus.topics import DECISION, IN_LOCKSTEP, METHOD
 from lira.hal.client.arena import WiredArena
+from lira.hal.client.connect import on_bus
 from lira.hal.client.remote import RemoteArena, RemoteRobot
 from lira.hal.errors import ConfigError
 from lira.hal.messages import Episode
@@ -32,12 +32,9 @@ def arena_of(args: argparse.Namespace, robot: RemoteRobot) -> Iterator[tuple[Are
         remote = RemoteArena(robot)
         yield remote, _world(remote.info)
         return
-    bus = Bus(args.name, connect=args.arena)
-    try:
+    with on_bus(args.arena, args.name, close_s=CLOSE_S) as bus:
         wired = WiredArena(bus, robot)
         yield wired, _world(wired.info)
-    finally:
-        bus.close(CLOSE_S)
 
 
 def _world(info: bytes) -> World:
@@ -50,21 +47,15 @@ def _world(info: bytes) -> World:
 @contextmanager
 def request_line(robot: RemoteRobot, args: argparse.Namespace) -> Iterator[RequestLine]:
     """Listen to what a person asks."""
-    watch = Bus(args.name, connect=args.connect, watch=True)
-    try:
+    with on_bus(args.connect, args.name, watch=True, close_s=CLOSE_S) as watch:
         yield RequestLine(robot.bus, watch, robot.now)
-    finally:
-        watch.close(CLOSE_S)
 
 
 @contextmanager
 def hand_of(args: argparse.Namespace) -> Iterator[Hand]:
     """Listen to whether a hand drives."""
-    watch = Bus(args.name, connect=args.connect, watch=True)
-    try:
+    with on_bus(args.connect, args.name, watch=True, close_s=CLOSE_S) as watch:
         yield Hand(watch)
-    finally:
-        watch.close(CLOSE_S)
 
 
 def restarter(robot: RemoteRobot, args: argparse.Namespace) -> Callable[[], None] | None:

@@ -94,17 +94,14 @@ def behind(args: argparse.Namespace, moment: "Moment") -> list[str]:
 
 def now(args: argparse.Namespace) -> "Moment":
     """The moment at hand."""
-    from lira.hal.bus.bus import Bus
     from lira.hal.bus.services import ask_info
+    from lira.hal.client.connect import on_bus
     from lira.tools.cli import version
     from lira.tools.inquiry.moment import moment_now
     from lira.tools.launch.lifetime import CLOSE_S
     from lira.tools.recording.layout import Head
 
-    bus = Bus(args.name, connect=args.connect, watch=True)
-    try:
+    with on_bus(args.connect, args.name, watch=True, close_s=CLOSE_S) as bus:
         info = ask_info(bus)
         began_ns = time.time_ns()
         return moment_now(bus, Head(bus.robot, version(), 0, began_ns, info), HEARD_S)
-    finally:
-        bus.close(CLOSE_S)

@@ -57,7 +57,7 @@ def run(args: argparse.Namespace) -> int:
 
 def record(args: argparse.Namespace, stop: "Event") -> int:
     """Record until `stop` is set, or the disk takes no more."""
-    from lira.hal.bus.bus import Bus
+    from lira.hal.client.connect import on_bus
     from lira.tools.cli import version
     from lira.tools.launch.lifetime import CLOSE_S
     from lira.tools.launch.notify import Notifier
@@ -70,8 +70,7 @@ def record(args: argparse.Namespace, stop: "Event") -> int:
     folder = new_folder(args.run) if args.run else args.out or Path("recordings") / f"{datetime.now():%Y%m%d-%H%M%S}"
     check_folder(folder)
     notifier = Notifier.from_environment()
-    bus = Bus(args.name, connect=args.connect, watch=True)
-    try:
+    with on_bus(args.connect, args.name, watch=True, close_s=CLOSE_S) as bus:
         head, tap, heard = listen(bus, version(), shlex.join(["lira", *sys.argv[1:]]), stop)
         writer = RecordingWriter(folder, head, split_bytes=args.split * 2**20)
         os.nice(NICENESS)
@@ -80,8 +79,6 @@ def record(args: argparse.Namespace, stop: "Event") -> int:
         say(words)
         notifier.ready(words)
         recorder.run(stop, heard, notifier.alive)
-    finally:
-        bus.close(CLOSE_S)
     lost = recorder.lost.total()
     say(f"recorded {recorder.count} messages, {writer.size_bytes / 1e6:.1f} MB, lost {lost}: {folder}")
     return 0

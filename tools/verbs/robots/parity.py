@@ -71,15 +71,12 @@ def address(word: str) -> tuple[str, str]:
 
 def over_bus(name: str, endpoint: str, shown: str = "") -> "Recording":
     """Drive a robot that is on the bus through the script."""
-    from lira.hal.bus.bus import Bus
+    from lira.hal.client.connect import on_bus
     from lira.tools.parity.record import record
 
     print(f"{shown or f'{name}@{endpoint}'}: ...", file=sys.stderr, flush=True)
-    bus = Bus(name, connect=endpoint)
-    try:
+    with on_bus(endpoint, name, close_s=CLOSE_S) as bus:
         return record(bus, shown or f"{name}@{endpoint}")
-    finally:
-        bus.close(CLOSE_S)
 
 
 def own(args: argparse.Namespace) -> "tuple[Recording, Recording]":
