@@ -38,14 +38,13 @@ class Offer:
         info = ask_info(bus, FIND_S)
         if info.mode == LOCKSTEP:
             raise ConfigError("a robot in lockstep is no robot of ROS's", "Run it in real time.")
-        arena = bytes(info.arena) != b"null"
         self._applied = bus.reader(APPLIED, 8)
         self._clock = ClockEstimate()
         self._heard_s = float("-inf")
         self._armed = False
-        self._telemetry = Telemetry(bus, node, said_by(info.profile, arena=arena))
+        self._telemetry = Telemetry(bus, node, said_by(info.profile, arena=info.has_arena))
         self._commands = Commands(bus, node, info.profile.control, secrets.token_bytes(16), self._robot_time)
-        self._services = Services(bus, node, arena=arena)
+        self._services = Services(bus, node, arena=info.has_arena)
 
     def run(self, stop: threading.Event) -> None:
         """Relay until `stop` is set. Raises `BusError` when one of the sessions is closed."""

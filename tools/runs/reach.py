@@ -4,10 +4,8 @@ import argparse
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
-import msgspec
-
 from lira.fusion.operator_service import RequestLine
-from lira.hal.bus.services import LOCKSTEP
+from lira.hal.bus.services import LOCKSTEP, understood
 from lira.hal.bus.topics import DECISION, IN_LOCKSTEP, METHOD
 from lira.hal.client.arena import WiredArena
 from lira.hal.client.connect import on_bus
@@ -30,15 +28,15 @@ def arena_of(args: argparse.Namespace, robot: RemoteRobot) -> Iterator[tuple[Are
     """Reach into the twin behind a robot, or behind its devices. Raises `ConfigError` for a robot that is none."""
     if args.arena is None:
         remote = RemoteArena(robot)
-        yield remote, _world(remote.info)
+        yield remote, _needed(remote.info)
         return
     with on_bus(args.arena, args.name, close_s=CLOSE_S) as bus:
         wired = WiredArena(bus, robot)
-        yield wired, _world(wired.info)
+        yield wired, _needed(wired.info)
 
 
-def _world(info: bytes) -> World:
-    world = msgspec.json.decode(info, type=World | None)
+def _needed(info: bytes) -> World:
+    world = world_in(info)
     if world is None:
         raise ConfigError("only a twin has layouts to drive, and shows a teacher where the robot is", NO_TWIN)
     return world
@@ -60,13 +58,19 @@ def hand_of(args: argparse.Namespace) -> Iterator[Hand]:
 
 def restarter(robot: RemoteRobot, args: argparse.Namespace) -> Callable[[], None] | None:
     """Return what puts a twin's robot back to the start; None for a real robot."""
-    arena = RemoteArena(robot)
-    return None if world_of(robot) == FLOOR else lambda: arena.reset(Episode(args.layout))
+    arena = robot.arena
+    return None if arena is None else lambda: arena.reset(Episode(args.layout))
+
+
+def world_in(info: bytes) -> World | None:
+    """Return a twin's world, from what its arena says; None for a real robot's. Raises `BusError`."""
+    world: World | None = understood(World | None, info)
+    return world
 
 
 def world_of(robot: RemoteRobot) -> str:
     """Return the name of a twin's world; `FLOOR` for a real robot."""
-    world = msgspec.json.decode(robot.info.arena, type=World | None)
+    world = world_in(bytes(robot.info.arena))
     return FLOOR if world is None else world.name
 
 
