@@ -7,7 +7,6 @@ with its twin: what a busy machine or a link adds in real time is proven by the 
 from collections.abc import Iterator, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
 from threading import Event
-from types import TracebackType
 from typing import Self
 
 from lira.fusion.log.recorder import Journal
@@ -56,9 +55,7 @@ class Exam:
         self._end = self._pool.submit(self._run)
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self._enough.set()
         self._pool.shutdown()
 
