@@ -20,7 +20,7 @@ exit status: 0 if it was done; check: 1 if something cannot be read (and was not
 """
 
 import argparse
-import json
+import sys
 from collections.abc import Callable
 from functools import partial
 from itertools import islice
@@ -188,12 +188,9 @@ def wanted_of(args: argparse.Namespace) -> "Wanted":
 
 def tell(args: argparse.Namespace, found: dict[str, Any], said: str) -> int:
     """Write JSON where it is wanted, and say the same in words unless JSON goes where they would."""
-    from lira.tools.output.machine import write_file
+    from lira.tools.output import machine
 
-    text = json.dumps(found, indent=2)
-    if args.json not in (None, "-"):
-        write_file(Path(args.json), text)
-    print(text if args.json == "-" else said, flush=True)
+    machine.tell(args.json, sys.stdout, found, said)
     return 0
 
 
