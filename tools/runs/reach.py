@@ -82,8 +82,3 @@ def reports_of(robot: RemoteRobot) -> Publish:
     qos = IN_LOCKSTEP if robot.info.mode == LOCKSTEP else None
     topics = {topic.kind: robot.bus.publisher(topic, qos) for topic in (DECISION, METHOD)}
     return lambda report: topics[type(report)].put(report, robot.now())
-
-
-def say(line: str) -> None:
-    """Print a line at once."""
-    print(line, flush=True)

@@ -43,7 +43,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Record until told to stop."""
     from lira.hal.server.server import stop_on_signal
-    from lira.tools.runs.reach import say
+    from lira.tools.output.say import say
 
     if args.recover is not None:
         from lira.tools.recording.recover import recover
@@ -62,10 +62,10 @@ def record(args: argparse.Namespace, stop: "Event") -> int:
     from lira.tools.launch.lifetime import CLOSE_S
     from lira.tools.launch.notify import Notifier
     from lira.tools.output.places import check_folder
+    from lira.tools.output.say import say
     from lira.tools.recording.beside import READY, new_folder
     from lira.tools.recording.recorder import Recorder, listen
     from lira.tools.recording.writer import RecordingWriter
-    from lira.tools.runs.reach import say
 
     folder = new_folder(args.run) if args.run else args.out or Path("recordings") / f"{datetime.now():%Y%m%d-%H%M%S}"
     check_folder(folder)

@@ -30,6 +30,7 @@ from typing import TYPE_CHECKING
 from lira.hal.errors import ConfigError
 from lira.hal.messages import Phase
 from lira.tools.options import add_expert, add_layout, add_protocol, add_randomise, add_record, add_seed, natural
+from lira.tools.output.say import say
 
 if TYPE_CHECKING:
     from lira.tools.launch.launch import Part
@@ -141,7 +142,7 @@ def watch(parts: Sequence["Part"], fusion_command: list[str], folder: Path) -> N
     from lira.tools.launch.processes import ChildProcess
 
     with (
-        running(parts, folder, lambda line: print(line, flush=True)) as robot,
+        running(parts, folder, say) as robot,
         ChildProcess("the learner", fusion_command, folder / "lira.fusion.log") as learner,
     ):
         follow(robot, learner, folder)

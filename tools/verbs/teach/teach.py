@@ -96,7 +96,7 @@ def run(args: argparse.Namespace) -> int:
     from lira.tools.launch.lifetime import CLOSE_S
     from lira.tools.live.rules import Rules
     from lira.tools.live.sitting import sit
-    from lira.tools.runs.reach import say
+    from lira.tools.output.say import say
 
     scripted = args.person != "hand"
     args.run = args.run or Path("runs") / f"teach-{args.who}-{datetime.now():%Y%m%d-%H%M%S}"
@@ -149,7 +149,7 @@ def robot_of(args: argparse.Namespace) -> Iterator[None]:
     """The robot that is there, or a twin for as long as the session lasts. Sets `args.connect`, for a script a name."""
     from lira.tools.launch.launch import direct, running, twin_words
     from lira.tools.launch.processes import free_port
-    from lira.tools.runs.reach import say
+    from lira.tools.output.say import say
 
     if args.connect is not None:
         yield
