@@ -13,13 +13,13 @@ from tempfile import TemporaryDirectory
 import numpy as np
 
 from lira.hal.bus.attachment import Attachment
-from lira.hal.bus.topics import APPLIED, SCAN
 from lira.hal.client.connect import connect
 from lira.hal.errors import BusError
-from lira.hal.messages import STOP, Command, LaserScan
+from lira.hal.messages import STOP, LaserScan
 from lira.hal.messages.codec import encode
 from lira.tools.bench import Row
 from lira.tools.bench.parts import echo, null_robot
+from lira.tools.bench.parts.answers import Answers
 from lira.tools.launch.processes import ChildProcess, free_port
 
 RUNS = 3
@@ -70,26 +70,16 @@ def measure() -> dict[str, float]:
 def measure_stack(name: str, endpoint: str) -> tuple[list[float], LaserScan]:
     """Answer every scan at once, and find when each answer was applied."""
     with connect(endpoint, name) as robot:
-        results = robot.bus.reader(APPLIED, depth=64)
-        scans = robot.bus.reader(SCAN)
-        captured_s: dict[int, float] = {}
-        taken_ms: dict[int, float] = {}
+        answers = Answers(robot, STOP)
+        taken_ms: list[float] = []
         deadline_s = time.monotonic() + LIMIT_S
         while len(taken_ms) < SCANS + WARM_UP and time.monotonic() < deadline_s:
-            for received in scans.poll():
-                if received.attachment is not None:
-                    seq = received.attachment.seq
-                    captured_s[seq] = received.message.stamp_s
-                    robot.drive(Command(STOP, robot.now(), answers=seq))
-            for result in results.poll():
-                seq = result.message.answers
-                if seq in captured_s:
-                    taken_ms.setdefault(seq, 1e3 * (result.message.stamp_s - captured_s[seq]))
+            taken_ms += answers.poll()
             time.sleep(POLL_S)
-        newest = scans.newest()
+        newest = answers.scans.newest()
         if newest is None or len(taken_ms) < SCANS + WARM_UP:
             raise BusError(f"{len(taken_ms)} of {SCANS + WARM_UP} commands were applied", "Is the machine overloaded?")
-        return list(taken_ms.values())[WARM_UP:], newest.message
+        return taken_ms[WARM_UP:], newest.message
 
 
 def measure_echo(endpoint: str, scan: LaserScan) -> list[float]:

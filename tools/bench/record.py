@@ -13,12 +13,11 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
-from lira.hal.bus.reader import Reader, Tap
-from lira.hal.bus.topics import APPLIED, SCAN
+from lira.hal.bus.reader import Tap
 from lira.hal.client.connect import connect, on_bus
-from lira.hal.client.remote import RemoteRobot
-from lira.hal.messages import Applied, Command, LaserScan, Twist
+from lira.hal.messages import Twist
 from lira.tools.bench import Row
+from lira.tools.bench.parts.answers import Answers
 from lira.tools.launch.processes import ChildProcess, free_port, lira_command
 from lira.tools.recording.beside import READY
 from lira.tools.recording.reader import Recording
@@ -97,9 +96,7 @@ def quantiles(values: list[float]) -> tuple[float, float]:
 class Pair:
     """The driver and the watcher."""
 
-    robot: RemoteRobot
-    scans: Reader[LaserScan]
-    results: Reader[Applied]
+    answers: Answers
     tap: Tap
 
 
@@ -107,26 +104,15 @@ class Pair:
 def driver(name: str, endpoint: str) -> Iterator[Pair]:
     """Open both ends."""
     with connect(endpoint, name) as robot, on_bus(endpoint, name, watch=True) as watch:
-        yield Pair(robot, robot.bus.reader(SCAN), robot.bus.reader(APPLIED, depth=64), watch.tap())
+        yield Pair(Answers(robot, TURN), watch.tap())
 
 
 def drive(pair: Pair, seconds: float, half: Half) -> Heard:
     """Answer every scan for so long, and note how soon each answer was applied. Returns what the watcher heard."""
-    captured_s: dict[int, float] = {}
-    answered: set[int] = set()
     heard: Heard = set()
     began_s = time.monotonic()
     while (now_s := time.monotonic()) < began_s + seconds:
-        for received in pair.scans.poll():
-            if received.attachment is not None:
-                seq = received.attachment.seq
-                captured_s[seq] = received.message.stamp_s
-                pair.robot.drive(Command(TURN, pair.robot.now(), answers=seq))
-        for result in pair.results.poll():
-            seq = result.message.answers
-            if seq in captured_s and seq not in answered:
-                answered.add(seq)
-                half.answers_ms.append(1e3 * (result.message.stamp_s - captured_s[seq]))
+        half.answers_ms += pair.answers.poll()
         heard |= {(each.key, each.attachment, each.payload) for each in pair.tap.poll()}
         time.sleep(POLL_S)
     half.seconds += now_s - began_s
