@@ -4,7 +4,7 @@ Who answers is in `hal.server`. To press, to release and to look are keys of the
 permission of its own: anybody may press and look.
 """
 
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 import msgspec
 
@@ -36,13 +36,23 @@ class Info(msgspec.Struct, frozen=True):
         """Encode for the bus."""
         return msgspec.json.encode(self)
 
+    @property
+    def has_arena(self) -> bool:
+        """Whether it is a twin's."""
+        return bytes(self.arena) != b"null"
+
+
+def understood(kind: Any, data: bytes) -> Any:
+    """Return what a robot says, from JSON, as a value of `kind`. Raises `BusError`."""
+    try:
+        return decode_json(kind, data)
+    except CodecError as error:
+        raise BusError(f"the robot says what is not understood: {error}", "Run one version on both sides.") from error
+
 
 def info_from_json(data: bytes) -> Info:
     """Decode what `Info.to_json` wrote. Raises `BusError`."""
-    try:
-        info: Info = decode_json(Info, data)
-    except CodecError as error:
-        raise BusError(f"the robot says what is not understood: {error}", "Run one version on both sides.") from error
+    info: Info = understood(Info, data)
     return info
 
 
@@ -53,10 +63,7 @@ def ask_info(bus: Bus, timeout_s: float = INFO_S) -> Info:
 
 def reset_time(answer: bytes) -> float:
     """Return when a reset happened, from the robot's answer to it. Raises `BusError`."""
-    try:
-        moment_s: float = decode_json(Moment, answer)
-    except CodecError as error:
-        raise BusError(f"the robot says what is not understood: {error}", "Run one version on both sides.") from error
+    moment_s: float = understood(Moment, answer)
     return moment_s
 
 
@@ -91,9 +98,5 @@ def look_at_estop(bus: Bus, timeout_s: float = ANSWER_S) -> EstopState:
 
 
 def _ask(bus: Bus, key: str, timeout_s: float, epoch: int | None) -> EstopState:
-    answer = bus.answer(key, timeout_s=timeout_s, epoch=epoch)
-    try:
-        state: EstopState = decode_json(EstopState, answer.payload)
-    except CodecError as error:
-        raise BusError(f"the robot answers '{key}' with what is not understood: {error}") from error
+    state: EstopState = understood(EstopState, bus.answer(key, timeout_s=timeout_s, epoch=epoch).payload)
     return state

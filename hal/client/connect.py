@@ -1,4 +1,4 @@
-"""How a robot at the other end of the bus is found."""
+"""How a robot at the other end of the bus is reached."""
 
 from collections.abc import Iterator
 from contextlib import closing, contextmanager
@@ -18,6 +18,19 @@ def open_remote(bus: Bus, answer_s: float = INFO_S) -> RemoteRobot:
 
 
 @contextmanager
+def on_bus(address: str, name: str, *, watch: bool = False, close_s: float = CLOSE_S) -> Iterator[Bus]:
+    """Open a client's bus for the robot `name` that listens at `address` (HOST:PORT), and close it in the end.
+
+    Leaving a link that is dead takes `close_s` at most.
+    """
+    bus = Bus(name, connect=address, watch=watch)
+    try:
+        yield bus
+    finally:
+        bus.close(close_s)
+
+
+@contextmanager
 def connect(
     address: str = DEFAULT_ENDPOINT, name: str = DEFAULT_ROBOT, *, close_s: float = CLOSE_S
 ) -> Iterator[RemoteRobot]:
@@ -26,9 +39,5 @@ def connect(
     Leaving a link that is dead takes `close_s` at most. Raises `BusError` if nobody answers. Keys are those that
     LIRA_KEYS names.
     """
-    bus = Bus(name, connect=address)
-    try:
-        with closing(open_remote(bus)) as robot:
-            yield robot
-    finally:
-        bus.close(close_s)
+    with on_bus(address, name, close_s=close_s) as bus, closing(open_remote(bus)) as robot:
+        yield robot

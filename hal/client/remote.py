@@ -37,7 +37,7 @@ class RemoteRobot(Robot):
     @property
     def arena(self) -> "RemoteArena | None":
         """What a twin can do and a floor cannot; None for a robot on a floor."""
-        return None if bytes(self.info.arena) == b"null" else RemoteArena(self)
+        return RemoteArena(self) if self.info.has_arena else None
 
     def open(self) -> None:
         """Nothing to do: it is open from the start."""

@@ -28,6 +28,7 @@ from lira.hal.messages import Episode, Phase
 from lira.tools.bench import Row
 from lira.tools.launch.processes import ChildProcess, free_port, lira_command
 from lira.tools.runs.build import build_method
+from lira.tools.runs.names import LABELS, RECORD
 
 RUNS = 3
 WORLD = "race"
@@ -79,7 +80,7 @@ def drive(robot: RemoteRobot, layout: int, folder: Path) -> dict[str, float]:
     method = build_method(begun, profile, layout, partial(ProcessTrainer, adopt_after_s=profile.period_s))
     decisions = robot.bus.publisher(DECISION)
     try:
-        with DemonstrationLog(folder / "labels.lira", profile) as log, RunWriter(folder / "run.jsonl") as record:
+        with DemonstrationLog(folder / LABELS, profile) as log, RunWriter(folder / RECORD) as record:
             journal = Journal(
                 keep=log.append, write=record.write, publish=lambda decision: decisions.put(decision, robot.now())
             )

@@ -8,15 +8,14 @@ import os
 import statistics
 import time
 from collections.abc import Iterator
-from contextlib import closing, contextmanager
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
-from lira.hal.bus.bus import Bus
 from lira.hal.bus.reader import Reader, Tap
 from lira.hal.bus.topics import APPLIED, SCAN
-from lira.hal.client.connect import connect
+from lira.hal.client.connect import connect, on_bus
 from lira.hal.client.remote import RemoteRobot
 from lira.hal.messages import Applied, Command, LaserScan, Twist
 from lira.tools.bench import Row
@@ -107,7 +106,7 @@ class Pair:
 @contextmanager
 def driver(name: str, endpoint: str) -> Iterator[Pair]:
     """Open both ends."""
-    with connect(endpoint, name) as robot, closing(Bus(name, connect=endpoint, watch=True)) as watch:
+    with connect(endpoint, name) as robot, on_bus(endpoint, name, watch=True) as watch:
         yield Pair(robot, robot.bus.reader(SCAN), robot.bus.reader(APPLIED, depth=64), watch.tap())
 
 
