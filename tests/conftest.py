@@ -70,11 +70,15 @@ def pytest_ignore_collect(collection_path: Path, config: pytest.Config) -> bool 
 
 
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
-    """Mark every test by its kind (`kinds.py`), and choose those of this half of the run."""
+    """Mark every test by its kind (`kinds.py`), and choose those of this half of the run.
+
+    A crowd begins with the files that mostly wait, the slowest first: what is left in the end is short, and only counts.
+    """
     for item in items:
         item.add_marker(kind_of(item.path))
     if config.getoption("crowd"):
         items[:] = [item for item in items if item.get_closest_marker("alone") is None]
+        items.sort(key=lambda item: (item.get_closest_marker("slow") is None, kind_of(item.path) != "processes"))
     elif config.getoption("alone"):
         left_open = config.cache.get(OPEN, [])
         items[:] = [item for item in items if item.get_closest_marker("alone") or item.nodeid in left_open]
