@@ -72,7 +72,7 @@ def pytest_ignore_collect(collection_path: Path, config: pytest.Config) -> bool 
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
     """Mark every test by its kind (`kinds.py`), and choose those of this half of the run.
 
-    A crowd begins with the files that mostly wait, the slowest first: what is left in the end is short, and only counts.
+    A crowd begins with the files that mostly wait, the slowest first: what is left in the end is short.
     """
     for item in items:
         item.add_marker(kind_of(item.path))

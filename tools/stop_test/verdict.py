@@ -39,12 +39,12 @@ STOPPERS: dict[Reason, str] = {
 class Rules:
     """What may happen in a trial. Times are those of the journal; what was before `began_s` does not matter.
 
-    `drives` may move the wheels, until `broken_s` and by commands no older than `stale_s`; nobody else ever. After the
-    first zero nobody may, until `mended_s` and for ever if not `resumes`; then only after a neutral command of
-    `drives`, which has to come after `mended_s` if it `renews`. From `shut_out_s` on the commands that they send count
-    for nothing. Until `silent_s` the fault is to change nothing: `drives` may stand and drive on, by a neutral command of
-    their own, as they do where the machine lets them wait for their sensors. `asks` are those whose wish to move, from `asked_from_s` on, makes the trial one. `below`: who stopped
-    it where the governor did not.
+    `drives` may move the wheels, until `broken_s` and by commands no older than `stale_s`; nobody else ever. Until
+    `silent_s` the fault is to change nothing: they may stand and drive on by a neutral command of their own, as they do
+    where the machine lets them wait for their sensors. After the first zero from then on nobody may, until `mended_s`
+    and for ever if not `resumes`; then only after a neutral command of `drives`, which has to come after `mended_s` if
+    it `renews`. From `shut_out_s` on what they send counts for nothing. `asks` are those whose wish to move,
+    from `asked_from_s` on, makes the trial one. `below`: who stopped it where the governor did not.
     """
 
     began_s: float
