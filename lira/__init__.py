@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from lira.fusion.methods.base import Choice, Expert, Method, Proposal
     from lira.fusion.methods.context import Context, MethodSettings
     from lira.fusion.preprocess import Features
-    from lira.hal.client.remote import connect
+    from lira.hal.client.connect import connect
     from lira.hal.errors import LiraError
     from lira.hal.messages import (
         Applied,
@@ -59,7 +59,7 @@ _WHERE = {
     "lira.fusion.methods.base": ("Choice", "Expert", "Method", "Proposal"),
     "lira.fusion.methods.context": ("Context", "MethodSettings"),
     "lira.fusion.preprocess": ("Features",),
-    "lira.hal.client.remote": ("connect",),
+    "lira.hal.client.connect": ("connect",),
     "lira.hal.errors": ("LiraError",),
     "lira.hal.messages": (
         "Applied",

@@ -31,7 +31,7 @@ ROOMS = {
         "ros_graph": {"errors", "messages", "rmw", "bus"},
         "safety": {"clock", "messages", "profile", "port"},
         "server": {"errors", "clock", "messages", "profile", "port", "bus", "description", "safety"},
-        "client": {"errors", "clock", "messages", "profile", "bus"},
+        "client": {"errors", "clock", "messages", "profile", "port", "bus"},
         "testing": {"messages", "profile", "bus"},
     },
     "fusion": {

@@ -8,7 +8,7 @@ from lira.fusion.control import Step
 from lira.fusion.learning.learned_policy import LearnedPolicy
 from lira.fusion.log.counts import Ledger
 from lira.fusion.log.label_log import Demonstration
-from lira.fusion.log.run_log import ContradictionRecord, Pose, Record, StepRecord
+from lira.fusion.log.run_log import ContradictionRecord, Pose, Record, ResultRecord, StepRecord
 from lira.fusion.methods.base import Proposal
 from lira.fusion.preprocess import MODALITIES
 from lira.hal.messages import Call, Decision, Driver, Phase
@@ -63,6 +63,34 @@ class Journal:
         return tuple(
             ContradictionRecord(number, each.source, lap, since_s, each.action, each.others, each.mirrored)
             for (number, lap, since_s), each in places
+        )
+
+    def result(
+        self,
+        *,
+        converged: bool,
+        laps: int,
+        training_steps: int,
+        simulated_s: float,
+        proof: str,
+        contradictions: tuple[ContradictionRecord, ...] = (),
+    ) -> ResultRecord:
+        """Sum up what happened, of which the journal knows all but this."""
+        ledger = self.ledger
+        return ResultRecord(
+            converged=converged,
+            laps=laps,
+            human_labels=ledger.labels.stored_human,
+            demonstration=ledger.labels.demonstration,
+            interventions=ledger.interventions,
+            calls=ledger.calls,
+            buffer=ledger.buffer,
+            training_steps=training_steps,
+            simulated_s=simulated_s,
+            elapsed_s=self.elapsed_s,
+            account=ledger.account,
+            proof=proof,
+            contradictions=contradictions,
         )
 
     def note(self, step: Step, *, phase: Phase, lap: int, layout: int, training_steps: int) -> None:

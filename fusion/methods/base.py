@@ -55,6 +55,10 @@ class Choice:
     given: int = 0
 
 
+ASK = Choice(Driver.NOBODY, STAND, call=Call.FEEDBACK)
+"""Stand, and ask the human to drive: who knows nothing yet."""
+
+
 @dataclass(frozen=True, slots=True)
 class Proposal:
     """What a method wants done on one observation as long as no human decides otherwise."""

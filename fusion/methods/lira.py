@@ -18,7 +18,7 @@ import msgspec
 import numpy as np
 
 from lira.fusion.learning.novice import Novice
-from lira.fusion.methods.base import STAND, Choice, Expert, Lesson, Method, Policy, Proposal
+from lira.fusion.methods.base import ASK, Choice, Expert, Lesson, Method, Policy, Proposal
 from lira.fusion.methods.context import Context, MethodSettings
 from lira.fusion.preprocess import Features
 from lira.hal.messages import Action, Call, Driver, ExpertView
@@ -90,7 +90,7 @@ def choose(human: Action | None, experts: Sequence[ExpertView], a_n: Action, thr
 
 
 class LiraSpf(Method):
-    """Learning Interactively to Resolve Ambiguity in Sensor Policy Fusion."""
+    """Learning Interactively to Resolve Ambiguity in Sensor Policy Fusion. Line 25 is `Method.update`."""
 
     novice: Novice
 
@@ -106,10 +106,6 @@ class LiraSpf(Method):
     def reset(self) -> None:
         """Line 1: S is empty, so nobody is active until it holds J actions."""
         self._s: list[deque[Action]] = [deque(maxlen=self._j) for _ in self.experts]
-
-    def update(self, now_s: float) -> None:
-        """Line 25, with the training itself elsewhere."""
-        self.novice.update(now_s)
 
     def propose(self, features: Features) -> Proposal:
         """Lines 3 to 6 and 10 to 23: what to execute unless the human gives feedback."""
@@ -162,4 +158,4 @@ class LiraSpf(Method):
         """Before the first training step the novice knows nothing: the human is asked to drive."""
         if self.settings.start == "experts":
             return Choice(Driver.MEAN, mean(a), label=mean(a))
-        return Choice(Driver.NOBODY, STAND, call=Call.FEEDBACK)
+        return ASK

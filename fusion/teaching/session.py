@@ -44,7 +44,7 @@ class Same:
 
 
 class Session:
-    """Teaches one apprentice on one robot.
+    """Teaches one apprentice on one robot, which it arms.
 
     `alone` says who drives in a phase without the teacher: the novice, if it is not given. Without
     an apprentice there is nobody to teach, only `alone` to be shown.
@@ -54,16 +54,17 @@ class Session:
         self,
         robot: Robot,
         arena: Arena,
-        loop: ControlLoop,
         journal: Journal,
         apprentice: Method | None,
         alone: Callable[[Phase], Method] | None = None,
     ) -> None:
+        loop = ControlLoop(robot, truth=arena.state)
         self._place = Place(robot, arena, loop, journal)
         self._apprentice = apprentice
         self._driver = alone or (lambda _: Alone(Driver.NOVICE, self._pupil.novice.alone))
         self._began_s = robot.now()
         self._laps = 0
+        loop.arm()
 
     def teach(self, course: Course, teacher: Teacher | None, laps: int, *, all_laps: bool = False) -> bool:
         """Train until the novice passes every proving run that follows a training lap, or through `all_laps` anyway.
@@ -103,19 +104,11 @@ class Session:
     def result(self, converged: bool, proof: str = "own") -> ResultRecord:
         """Sum the session up; `proof` says what `converged` means, as in `fusion.syllabus`."""
         journal = self._place.journal
-        ledger = journal.ledger
-        return ResultRecord(
+        return journal.result(
             converged=converged,
             laps=self._laps,
-            human_labels=ledger.labels.stored_human,
-            demonstration=ledger.labels.demonstration,
-            interventions=ledger.interventions,
-            calls=ledger.calls,
-            buffer=ledger.buffer,
             training_steps=self._training_steps,
             simulated_s=self._place.robot.now() - self._began_s,
-            elapsed_s=journal.elapsed_s,
-            account=ledger.account,
             proof=proof,
             contradictions=() if self._apprentice is None else journal.contradictions(self._apprentice.novice),
         )

@@ -4,12 +4,12 @@ Who answers is in `hal.server`. To press, to release and to look are keys of the
 permission of its own: anybody may press and look.
 """
 
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 import msgspec
 
 from lira.hal.bus.bus import Bus
-from lira.hal.bus.topics import ESTOP_LOOK, ESTOP_PRESS, ESTOP_RELEASE
+from lira.hal.bus.topics import ESTOP_LOOK, ESTOP_PRESS, ESTOP_RELEASE, INFO
 from lira.hal.errors import BusError, CodecError
 from lira.hal.messages.bounds import LARGEST
 from lira.hal.messages.codec import decode_json
@@ -18,6 +18,7 @@ from lira.hal.profile import RobotProfile
 REALTIME: Literal["realtime"] = "realtime"
 LOCKSTEP: Literal["lockstep"] = "lockstep"
 ANSWER_S = 2.0
+INFO_S = 5.0
 
 Epoch = Annotated[int, msgspec.Meta(ge=0)]  # msgspec keeps integers within 64 bits
 Moment = Annotated[float, msgspec.Meta(ge=-LARGEST, le=LARGEST)]
@@ -35,22 +36,34 @@ class Info(msgspec.Struct, frozen=True):
         """Encode for the bus."""
         return msgspec.json.encode(self)
 
+    @property
+    def has_arena(self) -> bool:
+        """Whether it is a twin's."""
+        return bytes(self.arena) != b"null"
+
+
+def understood(kind: Any, data: bytes) -> Any:
+    """Return what a robot says, from JSON, as a value of `kind`. Raises `BusError`."""
+    try:
+        return decode_json(kind, data)
+    except CodecError as error:
+        raise BusError(f"the robot says what is not understood: {error}", "Run one version on both sides.") from error
+
 
 def info_from_json(data: bytes) -> Info:
     """Decode what `Info.to_json` wrote. Raises `BusError`."""
-    try:
-        info: Info = decode_json(Info, data)
-    except CodecError as error:
-        raise BusError(f"the robot says what is not understood: {error}", "Run one version on both sides.") from error
+    info: Info = understood(Info, data)
     return info
+
+
+def ask_info(bus: Bus, timeout_s: float = INFO_S) -> Info:
+    """Ask a robot who it is. Raises `BusError` if it does not answer."""
+    return info_from_json(bus.ask(INFO, timeout_s=timeout_s))
 
 
 def reset_time(answer: bytes) -> float:
     """Return when a reset happened, from the robot's answer to it. Raises `BusError`."""
-    try:
-        moment_s: float = decode_json(Moment, answer)
-    except CodecError as error:
-        raise BusError(f"the robot says what is not understood: {error}", "Run one version on both sides.") from error
+    moment_s: float = understood(Moment, answer)
     return moment_s
 
 
@@ -85,9 +98,5 @@ def look_at_estop(bus: Bus, timeout_s: float = ANSWER_S) -> EstopState:
 
 
 def _ask(bus: Bus, key: str, timeout_s: float, epoch: int | None) -> EstopState:
-    answer = bus.answer(key, timeout_s=timeout_s, epoch=epoch)
-    try:
-        state: EstopState = decode_json(EstopState, answer.payload)
-    except CodecError as error:
-        raise BusError(f"the robot answers '{key}' with what is not understood: {error}") from error
+    state: EstopState = understood(EstopState, bus.answer(key, timeout_s=timeout_s, epoch=epoch).payload)
     return state

@@ -125,6 +125,20 @@ DIAGNOSTICS = Topic("diagnostics", DiagnosticArray, 1.0, 3.0, REPORT, REPORT_BYT
 SIM_STATE = Topic("sim/state", CourseState, 20.0, 0.3, SENSOR)
 CLOCK = Topic("clock", Clock, 20.0, 0.3, URGENT, fixed_bytes(Clock(0.0)))  # lockstep only: closes an observation
 
+COMMANDS: tuple[Topic[Twist], ...] = (CMD_VEL, TELEOP)
+# What operators tell; all else on the bus, but commands, the robot says alone.
+FROM_OPERATORS: tuple[Topic[Any], ...] = (
+    ESTOP,
+    JOY,
+    JOY_FEEDBACK,
+    OPERATOR,
+    OPERATOR_ANSWER,
+    DECISION,
+    METHOD,
+    SESSION,
+    DIAGNOSTICS,
+)
+
 TOPICS: tuple[Topic[Any], ...] = (
     SCAN,
     CAMERA,
@@ -138,34 +152,11 @@ TOPICS: tuple[Topic[Any], ...] = (
     DESCRIPTION,
     CAMERA_INFO,
     DEPTH_INFO,
-    CMD_VEL,
-    TELEOP,
+    *COMMANDS,
     APPLIED,
-    ESTOP,
-    JOY,
-    JOY_FEEDBACK,
-    OPERATOR,
-    OPERATOR_ANSWER,
-    DECISION,
-    METHOD,
-    SESSION,
-    DIAGNOSTICS,
+    *FROM_OPERATORS,
     SIM_STATE,
     CLOCK,
-)
-
-COMMANDS: tuple[Topic[Twist], ...] = (CMD_VEL, TELEOP)
-# What operators tell; all else on the bus, but commands, the robot says alone.
-FROM_OPERATORS: tuple[Topic[Any], ...] = (
-    ESTOP,
-    JOY,
-    JOY_FEEDBACK,
-    OPERATOR,
-    OPERATOR_ANSWER,
-    DECISION,
-    METHOD,
-    SESSION,
-    DIAGNOSTICS,
 )
 
 LATCHED_KEYS = frozenset(topic.key for topic in TOPICS if topic.qos.latched)  # sent once, for all who ever come

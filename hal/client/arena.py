@@ -6,8 +6,8 @@ from dataclasses import replace
 import msgspec
 
 from lira.hal.bus.bus import Bus
-from lira.hal.bus.services import info_from_json, reset_time
-from lira.hal.bus.topics import INFO, RESET, SIM_STATE
+from lira.hal.bus.services import ask_info, reset_time
+from lira.hal.bus.topics import RESET, SIM_STATE
 from lira.hal.client.remote import RESET_S, RemoteRobot
 from lira.hal.clock import ClockEstimate
 from lira.hal.errors import BusError
@@ -30,7 +30,7 @@ class WiredArena:
         self._clock = ClockEstimate()  # the twin's
         self._newest: CourseState | None = None
         self._not_before_s = float("-inf")
-        self.info = bytes(info_from_json(bus.ask(INFO)).arena)
+        self.info = bytes(ask_info(bus).arena)
 
     def reset(self, episode: Episode) -> None:
         """Start afresh, with wheels that stand. Raises `BusError` if the twin refuses."""
@@ -38,7 +38,7 @@ class WiredArena:
         answer = self._bus.ask(RESET, msgspec.json.encode(episode), timeout_s=RESET_S)
         self._not_before_s = reset_time(answer)
         # The twin answers when its devices show the new episode.
-        self._robot.link.refresh(self._robot.now())
+        self._robot.refresh(self._robot.now())
 
     def state(self) -> CourseState:
         """Ground truth now, stamped on the robot's clock. Raises `BusError` if none comes."""

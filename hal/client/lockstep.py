@@ -7,22 +7,22 @@ step sees does not depend on how fast the messages came.
 import time
 
 from lira.hal.bus.bus import Bus
+from lira.hal.bus.services import Info, ask_info
 from lira.hal.bus.topics import APPLIED, CLOCK, CMD_VEL, IN_LOCKSTEP, SIM_STATE, TELEOP
-from lira.hal.client.sensor_reader import SensorReader
+from lira.hal.client.remote import RemoteRobot
 from lira.hal.errors import BusError
 from lira.hal.messages import STOP, Applied, Clock, Command, CourseState, Observation, Source
-from lira.hal.profile import RobotProfile
 
 ANSWER_S = 5.0  # wall time; a robot that is silent for longer is gone
 POLL_S = 0.0001
 ROUNDING_S = 1e-6
 
 
-class LockstepLink:
-    """Talks to a robot whose time waits for commands. Made after `info` was asked, so that an observation is here."""
+class LockstepRobot(RemoteRobot):
+    """A robot whose time waits for commands."""
 
-    def __init__(self, bus: Bus, profile: RobotProfile) -> None:
-        self._sensors = SensorReader(bus, profile)
+    def __init__(self, bus: Bus, info: Info) -> None:
+        super().__init__(bus, info)
         self._states = bus.reader(SIM_STATE)
         self._results = bus.reader(APPLIED)
         self._clock = bus.reader(CLOCK)
@@ -32,20 +32,13 @@ class LockstepLink:
         self._observation = Observation(-1, 0.0)
         self._state: CourseState | None = None
         self._answered = True
-
-    @property
-    def epoch(self) -> int:
-        """Always the same: a robot in lockstep that is started anew does not go on."""
-        return 0
-
-    def start(self) -> None:
-        """Take up the observation that the robot waits with."""
+        ask_info(bus)  # the robot shows what it sees before it answers, and by now it is listened for
         self._advance()
 
     def stand(self) -> None:
         """Nothing to do: between two decisions no time passes."""
 
-    def refresh(self, reset_s: float) -> None:  # noqa: ARG002 - the real-time link needs it
+    def refresh(self, reset_s: float) -> None:  # noqa: ARG002 - in real time it is needed
         """Take up the first observation after a reset, whatever became of the last one."""
         self._take_newest()
 
@@ -55,10 +48,12 @@ class LockstepLink:
 
     def now(self) -> float:
         """Time of the present step."""
+        self._check_open()
         return self._observation.stamp_s
 
     def read(self) -> Observation:
         """Return the observation of the present step."""
+        self._check_open()
         if not self._answered:
             self._take_newest()
         return self._observation
@@ -100,6 +95,7 @@ class LockstepLink:
 
     def close(self) -> None:
         """Nothing moves in lockstep without a command, so there is nothing to stop."""
+        self._closed.set()
 
     def _advance(self) -> None:
         deadline_s = time.monotonic() + ANSWER_S

@@ -17,9 +17,10 @@ from collections.abc import Callable
 from dataclasses import replace
 
 from lira.hal.bus.bus import Bus
-from lira.hal.bus.publisher import Publisher
+from lira.hal.bus.services import Info, ask_info
 from lira.hal.bus.topics import APPLIED, CMD_VEL, SIM_STATE, TELEOP
-from lira.hal.client.sensor_reader import Sense, SensorReader
+from lira.hal.client.remote import RemoteRobot
+from lira.hal.client.sensor_reader import Sense
 from lira.hal.clock import ClockEstimate
 from lira.hal.errors import BusError
 from lira.hal.messages import (
@@ -31,11 +32,9 @@ from lira.hal.messages import (
     Observation,
     Reason,
     Source,
-    Twist,
     is_neutral,
     session_of,
 )
-from lira.hal.profile import RobotProfile
 
 REPEAT_HZ = 20.0
 DECISION_S = 0.5  # age at which a decision is no longer sent
@@ -44,16 +43,17 @@ POLL_S = 0.002
 NAP_S = 0.02
 NOBODY = -1
 HEAR_S = 5.0
+AGAIN_S = 0.5  # to ask a robot that was just heard
 MOMENT_S = 0.5
 FAREWELL = 3  # neutral commands at the end: one may be lost
 
 
-class RealTimeLink:
-    """Talks to a robot whose time passes by itself, and that stops when policy is silent for its time-out."""
+class RealTimeRobot(RemoteRobot):
+    """A robot whose time passes by itself, and that stops when policy is silent for its time-out."""
 
-    def __init__(self, bus: Bus, profile: RobotProfile) -> None:
-        self._patience_s = profile.control.policy_timeout_s
-        self._sensors = SensorReader(bus, profile)
+    def __init__(self, bus: Bus, info: Info) -> None:
+        super().__init__(bus, info)
+        self._patience_s = info.profile.control.policy_timeout_s
         self._states = Sense(bus, SIM_STATE)
         self._results = bus.reader(APPLIED, depth=16)
         self._publishers = {Source.POLICY: bus.publisher(CMD_VEL), Source.TELEOP: bus.publisher(TELEOP)}
@@ -64,37 +64,45 @@ class RealTimeLink:
         self._untold = False  # the robot has stopped by itself, and whoever drives here has not heard of it
         self._held: dict[Source, Command] = {}
         self._repeat_s = 0.0
-        self._boundary = bus.boundary
         # Over the order of what is sent, which a link may hold up; taken before the other one.
         self._sending = threading.Lock()
         # Over the clock, the held decisions and what came back: never held while something is sent.
         self._heard = threading.Condition()
-        self._stop = threading.Event()
         self._threads = [
             threading.Thread(target=self._run, args=[work, topic.key], name=f"remote-{name}", daemon=True)
             for name, work, topic in (("listen", self._listen, APPLIED), ("repeat", self._repeat, CMD_VEL))
         ]
-
-    @property
-    def epoch(self) -> int:
-        """Which start of the robot is listened to: its session's number. Times from before mean nothing after it."""
-        return self._epoch
-
-    def start(self) -> None:
-        """Listen until the robot's clock is known. Raises `BusError` if it says nothing."""
+        ask_info(bus)  # the robot shows what it sees before it answers, and by now it is listened for
         for thread in self._threads:
             thread.start()
-        deadline_s = time.monotonic() + HEAR_S
-        while not self._clock.known:
-            if time.monotonic() > deadline_s:
-                raise BusError("the robot says nothing about its wheels", "Check that it is still running.")
-            time.sleep(POLL_S)
+        if not _within(HEAR_S, lambda: self._clock.known):
+            self._closed.set()
+            raise BusError("the robot says nothing about its wheels", "Check that it is still running.")
+        self._known_epoch = self._epoch
+
+    def started_anew(self) -> bool:
+        """Whether the robot was started anew since this was asked last: times from before mean nothing then.
+
+        Raises `BusError` if it came back as another one.
+        """
+        epoch = self._epoch
+        if epoch == self._known_epoch:
+            return False
+        try:
+            info = ask_info(self.bus, AGAIN_S)
+        except BusError:
+            return False  # gone again: asked once more the next time
+        if (info.profile, info.mode) != (self.profile, self.info.mode):
+            what = f"a robot '{info.profile.name}' ({info.mode}) came back in place of '{self.profile.name}'"
+            raise BusError(what, "Start this program anew for it.")
+        self.info, self._known_epoch = info, epoch
+        return True
 
     def stand(self) -> None:
         """Have the robot stand until the next decision: what was decided before a reset does not drive after it."""
         with self._sending:
             with self._heard:
-                now_s = self._clock.now(time.monotonic())
+                now_s = self.now()
                 for source, command in self._held.items():
                     self._held[source] = replace(command, twist=STOP, stamp_s=now_s)
                 due = self._due(now_s, *self._held)
@@ -105,12 +113,11 @@ class RealTimeLink:
         before = self.read()
         self._sensors.forget(reset_s)
         self._states.forget(reset_s)
-        deadline_s = time.monotonic() + MOMENT_S
-        while not self._sensors.has_again(before, self.read()) and time.monotonic() < deadline_s:
-            time.sleep(POLL_S)
+        _within(MOMENT_S, lambda: self._sensors.has_again(before, self.read()))
 
     def now(self) -> float:
         """Seconds on the robot's clock, as estimated."""
+        self._check_open()
         with self._heard:
             return self._clock.now(time.monotonic())
 
@@ -120,10 +127,8 @@ class RealTimeLink:
 
     def state(self) -> CourseState | None:
         """Ground truth, None if none comes within a moment."""
-        deadline_s = time.monotonic() + MOMENT_S
-        while (state := self._states.read(self.now())) is None and time.monotonic() < deadline_s:
-            time.sleep(POLL_S)
-        return state
+        _within(MOMENT_S, lambda: self._states.read(self.now()) is not None)
+        return self._states.read(self.now())
 
     def drive(self, command: Command) -> Applied:
         """Send a command and wait a moment for what the robot says it applied on it.
@@ -135,7 +140,7 @@ class RealTimeLink:
         decided = command.source is Source.POLICY or command.answers >= 0
         with self._sending:
             with self._heard:
-                now_s = self._clock.now(time.monotonic())
+                now_s = self.now()
                 if decided and self._would_arm_blindly(now_s, command):
                     told = self._newest if self._untold else None
                     self._untold = False
@@ -164,19 +169,20 @@ class RealTimeLink:
             time.sleep(min(left_s, NAP_S))
 
     def close(self) -> None:
-        """Say stop, and fall silent."""
-        self._stop.set()
-        if self._threads[0].is_alive():
-            for thread in self._threads:
-                thread.join()
-            self._held.clear()
+        """Say stop, and fall silent; the robot runs on. May be called twice."""
+        if self._closed.is_set():
+            return
+        self._closed.set()
+        for thread in self._threads:
+            thread.join()
+        with self._sending:
             for _ in range(FAREWELL):
-                _put(self._publishers[Source.POLICY], Command(STOP, 0.0, released=True), self.now())
+                self._send([Command(STOP, 0.0, released=True)], self._clock.now(time.monotonic()))
 
     def _run(self, work: Callable[[], None], key: str) -> None:
-        while not self._stop.wait(POLL_S):
+        while not self._closed.wait(POLL_S):
             try:
-                with self._boundary.guard(key):
+                with self.bus.boundary.guard(key):
                     work()
             except BusError:
                 return  # the bus was closed first: whoever drives or reads hears of it
@@ -243,7 +249,16 @@ class RealTimeLink:
 
     def _send(self, commands: list[Command], time_s: float) -> None:
         for command in commands:
-            _put(self._publishers[command.source], command, time_s)
+            put = self._publishers[command.source].put
+            put(command.twist, time_s, answers=command.answers, released=command.released)
+
+
+def _within(seconds: float, condition: Callable[[], bool]) -> bool:
+    """Wait for a condition for so long; returns whether it came."""
+    deadline_s = time.monotonic() + seconds
+    while not (holds := condition()) and time.monotonic() < deadline_s:
+        time.sleep(POLL_S)
+    return holds
 
 
 def _results_from(applied: Applied | None, command: Command, sent_s: float) -> bool:
@@ -255,7 +270,3 @@ def _results_from(applied: Applied | None, command: Command, sent_s: float) -> b
         or command.source is not Source.POLICY
         or (applied.answers == command.answers)
     )
-
-
-def _put(publisher: Publisher[Twist], command: Command, time_s: float) -> None:
-    publisher.put(command.twist, time_s, answers=command.answers, released=command.released)

@@ -12,6 +12,7 @@ from rosbags.typesys.store import Typestore
 from lira.hal.errors import SensorError
 from lira.hal.messages import BatteryState, Imu, Range, Twist
 from lira.hal.messages.msg_text import read_all
+from lira.hal.messages.ros_types import yaw_from
 from lira.robot.core2.wheels import Pose
 
 # Before Noetic the battery's message had no temperatures.
@@ -104,13 +105,13 @@ def encode_twist(twist: Twist) -> bytes:
 def pose_of(message: Any) -> Pose:
     """Pose of a PoseStamped."""
     position = message.pose.position
-    return Pose(position.x, position.y, _yaw_of(message.pose.orientation))
+    return Pose(position.x, position.y, yaw_from(message.pose.orientation))
 
 
 def imu_of(message: Any, stamp_s: float) -> Imu:
     """Reading of the IMU."""
     acceleration = message.linear_acceleration
-    return Imu(stamp_s, _yaw_of(message.orientation), message.angular_velocity.z, acceleration.x, acceleration.y)
+    return Imu(stamp_s, yaw_from(message.orientation), message.angular_velocity.z, acceleration.x, acceleration.y)
 
 
 def range_of(message: Any, topic: str, stamp_s: float) -> Range:
@@ -128,7 +129,3 @@ def range_of(message: Any, topic: str, stamp_s: float) -> Range:
 def battery_of(message: Any, stamp_s: float) -> BatteryState:
     """Voltage of the battery."""
     return BatteryState(stamp_s, float(message.voltage))
-
-
-def _yaw_of(q: Any) -> float:
-    return math.atan2(2 * (q.w * q.z + q.x * q.y), 1 - 2 * (q.y * q.y + q.z * q.z))

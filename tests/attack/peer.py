@@ -16,7 +16,7 @@ from zenoh.handlers import RingChannel
 
 from lira.hal.bus.bus import Bus
 from lira.hal.bus.publisher import Publisher
-from lira.hal.client.remote import RemoteRobot
+from lira.hal.client.connect import open_remote
 from lira.hal.messages import HELD, STOP, Command, Reason, Twist
 
 GO = Twist(0.15, 0.0)
@@ -35,8 +35,7 @@ def drive(name, endpoint, log):
             put(self, message, *words, **more)
 
         Publisher.put = noted
-        robot = RemoteRobot(Bus(name, connect=endpoint), answer_s=20.0)
-        robot.open()
+        robot = open_remote(Bus(name, connect=endpoint), answer_s=20.0)
         print("drives", flush=True)
         reason = Reason.NO_COMMAND
         while True:

@@ -14,9 +14,9 @@ from zenoh.handlers import RingChannel
 
 from lira.hal.bus.attachment import MAGIC
 from lira.hal.bus.bus import Bus
-from lira.hal.bus.services import info_from_json, look_at_estop, release_estop
+from lira.hal.bus.services import ask_info, look_at_estop, release_estop
 from lira.hal.bus.topics import CMD_VEL, ESTOP_LOOK, ESTOP_PRESS, ESTOP_RELEASE, INFO, RESET, TOPICS
-from lira.hal.client.remote import RemoteRobot
+from lira.hal.client.connect import open_remote
 from lira.hal.messages import STOP, Applied, Bool, Clock, Command, LaserScan, Odometry, Twist
 from lira.hal.messages.codec import encode
 
@@ -119,7 +119,7 @@ def test_whatever_is_sent_it_lives_stands_and_drives_who_may(kind, tmp_path):
         kill(driver)
         before_mb = scene.memory_mb()
         attack(scene, bus._session, f"{scene.name}/")
-        assert info_from_json(bus.ask(INFO, timeout_s=5.0)).profile.name
+        assert ask_info(bus, 5.0).profile.name
         assert scene.wait(lambda: not scene.moves(), 2.0)
         began = len(scene.orders())
         time.sleep(1.0)
@@ -148,8 +148,7 @@ def test_whatever_is_sent_lockstep_goes_on(tmp_path):
         attack(scene, bus._session, f"{scene.name}/")
         look_at_estop(bus)  # then all that was pressed before has been served
         release_estop(bus)
-        robot = RemoteRobot(bus)
-        robot.open()
+        robot = open_remote(bus)
         for twist in (STOP, STOP, Twist(0.15, 0.0), Twist(0.15, 0.0)):
             applied = robot.drive(Command(twist, robot.now(), answers=robot.read().seq))
             robot.wait(robot.now() + robot.profile.period_s)

@@ -6,7 +6,7 @@ import pytest
 from scene import Scene, kill, moved_on_s
 
 from lira.hal.bus.bus import Bus
-from lira.hal.bus.services import info_from_json
+from lira.hal.bus.services import ask_info
 from lira.hal.bus.topics import CMD_VEL, ESTOP_PRESS, ESTOP_RELEASE, INFO, RESET, TELEOP, TOPICS
 
 FLOOD_S = 1.5
@@ -49,5 +49,5 @@ def test_whoever_floods_the_wheels_stop_in_time_and_memory_stays_small(kind, att
         for attacker in attackers:
             kill(attacker)
         bus = Bus(scene.name, connect=scene.endpoint)
-        assert info_from_json(bus.ask(INFO, timeout_s=5.0)).profile.name
+        assert ask_info(bus, 5.0).profile.name
         assert bus.close()

@@ -4,7 +4,7 @@ import threading
 import time
 import uuid
 from collections.abc import Callable, Iterator
-from contextlib import AbstractContextManager, contextmanager
+from contextlib import AbstractContextManager, closing, contextmanager
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
@@ -18,7 +18,8 @@ from lira.hal.bus.reader import RawSample
 from lira.hal.bus.sensors import SENSORS
 from lira.hal.bus.services import LOCKSTEP, Info
 from lira.hal.bus.topics import CMD_VEL, SIM_STATE
-from lira.hal.client.remote import RemoteArena, RemoteRobot
+from lira.hal.client.connect import open_remote
+from lira.hal.client.remote import RemoteArena
 from lira.hal.messages import Command, CourseState, Episode
 from lira.hal.messages.codec import encode
 from lira.hal.port import Arena, Robot
@@ -71,13 +72,11 @@ def served(inner: NullRobot | Twin, *, lockstep: bool) -> Iterator[Rig]:
         target=HalServer(GovernedRobot(inner), robot_bus, inner, lockstep=lockstep).run, args=[stop]
     )
     server.start()
-    robot = RemoteRobot(client_bus)
     try:
-        robot.open()
-        stamps_s = 1e-6 if lockstep else 1e-5
-        yield Rig(robot, inner, RemoteArena(robot), not lockstep, lockstep, stamps_s, robot_bus.offset_s)
+        with closing(open_remote(client_bus)) as robot:
+            stamps_s = 1e-6 if lockstep else 1e-5
+            yield Rig(robot, inner, RemoteArena(robot), not lockstep, lockstep, stamps_s, robot_bus.offset_s)
     finally:
-        robot.close()
         stop.set()
         server.join(10.0)
         assert client_bus.close()

@@ -8,7 +8,6 @@ import torch
 from safetensors.numpy import load_file
 from short_worlds import FEW_METRES
 
-from lira.fusion.control import ControlLoop
 from lira.fusion.learning.trainer import ProcessTrainer
 from lira.fusion.log.label_log import DemonstrationLog
 from lira.fusion.log.recorder import Journal
@@ -101,9 +100,7 @@ def test_in_process_gives_the_same_decisions_as_over_the_bus(demos, world, one_t
     method = build_method(METHODS["hold"], profile, 0, partial(ProcessTrainer, adopt_after_s=profile.period_s))
     try:
         with RunWriter(tmp_path / "run.jsonl") as record, DemonstrationLog(tmp_path / "labels.lira", profile) as log:
-            loop = ControlLoop(robot, truth=twin.state)
-            session = Session(robot, twin, loop, Journal(keep=log.append, write=record.write), method)
-            loop.arm()
+            session = Session(robot, twin, Journal(keep=log.append, write=record.write), method)
             session.teach(Same([lap(profile, floor, 0)]), teacher(SKILLED, profile, floor, 0, 0), LAPS)
     finally:
         method.close()

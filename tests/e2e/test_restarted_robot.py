@@ -7,7 +7,7 @@ from contextlib import contextmanager
 
 from lira.fusion.log.label_log import read_demonstrations
 from lira.hal.bus.bus import Bus
-from lira.hal.client.remote import RemoteRobot
+from lira.hal.client.connect import open_remote
 from lira.hal.messages import STOP, Command, Reason, Source, Twist
 from lira.tools.launch.processes import ChildProcess, free_port, lira_command
 
@@ -55,8 +55,7 @@ class Place:
 def hand(place):
     """Holds the dead-man: at rest for a moment, then ahead; and so again where the robot stands and wants it."""
     bus = Bus(place.name, connect=place.endpoint)
-    robot, stop = RemoteRobot(bus, answer_s=READY_S), threading.Event()
-    robot.open()
+    robot, stop = open_remote(bus, answer_s=READY_S), threading.Event()
 
     def drive():
         rest_until_s = time.monotonic() + REST_S

@@ -3,7 +3,7 @@
 import threading
 import time
 import uuid
-from contextlib import contextmanager
+from contextlib import closing, contextmanager
 from dataclasses import replace
 
 import cv2
@@ -15,7 +15,7 @@ from lira.fusion.log.recorder import Journal
 from lira.fusion.methods.base import Alone
 from lira.fusion.service import serve
 from lira.hal.bus.bus import Bus
-from lira.hal.client.remote import RemoteRobot
+from lira.hal.client.connect import open_remote
 from lira.hal.messages import STOP, CompressedImage, Reason, Twist
 from lira.hal.profile import load_profile
 from lira.hal.safety.governed import GovernedRobot
@@ -52,12 +52,10 @@ def on_the_bus(inner):
     robot_bus, bus = Bus(name, listen=endpoint), Bus(name, connect=endpoint)
     server = threading.Thread(target=HalServer(GovernedRobot(inner), robot_bus, inner).run, args=[stop])
     server.start()
-    robot = RemoteRobot(bus)
     try:
-        robot.open()
-        yield robot
+        with closing(open_remote(bus)) as robot:
+            yield robot
     finally:
-        robot.close()
         stop.set()
         server.join(10.0)
         assert bus.close()

@@ -117,9 +117,7 @@ def school(track, pupil=None):
     records = []
     pupil = pupil or Pupil()
     robot = GovernedRobot(track)
-    loop = ControlLoop(robot, truth=track.state)
-    session = Session(robot, track, loop, Journal(write=records.append), pupil)
-    loop.arm()
+    session = Session(robot, track, Journal(write=records.append), pupil)
     return session, lambda: [record for record in records if isinstance(record, LapRecord)]
 
 
@@ -372,10 +370,7 @@ def in_doubt(track):
     records = []
     robot = GovernedRobot(track)
     robot.open()
-    loop = ControlLoop(robot, truth=track.state)
-    session = Session(robot, track, loop, Journal(write=records.append), None, lambda _: Doubting(track, 1.0))
-    loop.arm()
-    return session, records
+    return Session(robot, track, Journal(write=records.append), None, lambda _: Doubting(track, 1.0)), records
 
 
 def test_a_stop_in_doubt_ends_a_proving_run_for_nobody_is_there_to_answer():

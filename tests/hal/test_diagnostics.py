@@ -6,7 +6,7 @@ from wiring import joined, new_endpoint, ready, real_time_null, remote, served, 
 
 from lira.hal.bus.bus import Bus
 from lira.hal.bus.topics import CMD_VEL, DIAGNOSTICS
-from lira.hal.client.remote import RemoteRobot
+from lira.hal.client.connect import open_remote
 from lira.hal.messages import STOP, Command, DiagnosticStatus
 from lira.hal.port import DeviceHealth
 from lira.hal.profile import load_profile
@@ -67,8 +67,7 @@ def test_it_says_that_datagrams_do_not_get_through_and_still_drives(capfd):
         with Relay(int(front.split(":")[1]), int(robot.endpoint.split(":")[1])) as relay:
             relay.faults.lost = 1.0
             bus = Bus(robot.name, connect=front)
-            client = RemoteRobot(bus)
-            client.open()
+            client = open_remote(bus)
             reader = bus.reader(DIAGNOSTICS)
             wait_for(lambda: client.drive(Command(STOP, client.now())).reason == "ok")
             wait_for(lambda: (link := status(reader, "link")) is not None and link.level == WARN, 10.0)

@@ -2,7 +2,7 @@
 
 import threading
 import time
-from contextlib import contextmanager
+from contextlib import closing, contextmanager
 from dataclasses import replace
 
 import msgspec
@@ -12,7 +12,7 @@ from wiring import PROFILE, Served, new_endpoint, real_time_null
 from lira.hal.bus.bus import Bus
 from lira.hal.bus.services import REALTIME, Info
 from lira.hal.client.arena import WiredArena
-from lira.hal.client.remote import RemoteRobot
+from lira.hal.client.connect import open_remote
 from lira.hal.errors import BusError
 from lira.hal.messages import STOP, Command, Episode, Reason, Twist
 from lira.hal.server.arena import ArenaLoop
@@ -52,12 +52,10 @@ def apart():
     loop = threading.Thread(target=ArenaLoop(elsewhere, arena_bus, info, elsewhere.now).run, args=[stop])
     loop.start()
     buses = Bus(served.name, connect=served.endpoint), Bus(served.name, connect=endpoint)
-    robot = RemoteRobot(buses[0])
-    robot.open()
     try:
-        yield robot, WiredArena(buses[1], robot), elsewhere, stop
+        with closing(open_remote(buses[0])) as robot:
+            yield robot, WiredArena(buses[1], robot), elsewhere, stop
     finally:
-        robot.close()
         stop.set()
         loop.join(5.0)
         for bus in (*buses, arena_bus):

@@ -3,6 +3,7 @@
 import threading
 import time
 from collections import deque
+from contextlib import ExitStack, closing
 
 import numpy as np
 import pytest
@@ -10,9 +11,11 @@ import pytest
 from lira.hal.bus.attachment import Attachment
 from lira.hal.bus.boundary import Boundary
 from lira.hal.bus.reader import Received
+from lira.hal.bus.services import REALTIME, Info
 from lira.hal.bus.topics import APPLIED, SCAN
-from lira.hal.client.realtime import RealTimeLink
+from lira.hal.client.realtime import RealTimeRobot
 from lira.hal.clock import SILENT_S
+from lira.hal.errors import BusError
 from lira.hal.messages import HELD, STOP, Applied, Command, LaserScan, Reason, Source, Twist, session_of
 from lira.hal.profile import load_profile
 
@@ -21,10 +24,11 @@ GO = Twist(0.5, 0.0)
 
 
 class FakeBus:
-    """What a link asks of a bus; the test says what comes and looks at what is sent."""
+    """What a remote robot asks of a bus; the test says what comes and looks at what is sent."""
 
     def __init__(self):
         self.epoch, self.queues, self.sent = 99, {}, []
+        self.info = Info(load_profile("thesis-sim"), REALTIME, 0)
         self.boundary = Boundary()
         self.began_s = time.monotonic()
 
@@ -33,6 +37,9 @@ class FakeBus:
 
     def publisher(self, topic, *_):
         return FakePublisher(self, topic.key)
+
+    def ask(self, *_, **__):
+        return self.info.to_json()
 
     def say(self, topic, message, epoch, time_s):
         attachment = Attachment(epoch, 1, round(time_s * 1e9), -1, False)
@@ -92,10 +99,9 @@ def bus():
 
 
 @pytest.fixture
-def link(bus):
-    link = RealTimeLink(bus, load_profile("thesis-sim"))
-    yield link
-    link.close()
+def opened(bus):
+    with ExitStack() as stack:
+        yield lambda: stack.enter_context(closing(RealTimeRobot(bus, bus.info)))
 
 
 def wait_for(condition, timeout_s=3.0):
@@ -105,11 +111,11 @@ def wait_for(condition, timeout_s=3.0):
         time.sleep(0.005)
 
 
-def test_a_wait_on_the_old_clock_ends_with_it(bus, link):
+def test_a_wait_on_the_old_clock_ends_with_it(bus, opened):
     first = FakeRobot(bus, 7, OLD)
-    link.start()
+    remote = opened()
     ended = threading.Event()
-    waiting = threading.Thread(target=lambda: (link.wait(link.now() + 3600.0), ended.set()))
+    waiting = threading.Thread(target=lambda: (remote.wait(remote.now() + 3600.0), ended.set()))
     waiting.start()
     assert not ended.wait(0.2)
     first.kill()
@@ -118,53 +124,75 @@ def test_a_wait_on_the_old_clock_ends_with_it(bus, link):
     assert ended.wait(2.0)
     second.kill()
     waiting.join()
-    assert link.epoch == 8
-    assert link.now() == pytest.approx(second.now(), abs=0.2)
+    assert remote.started_anew()
+    assert not remote.started_anew()  # that was told
+    assert remote.now() == pytest.approx(second.now(), abs=0.2)
 
 
-def test_what_was_decided_and_seen_before_is_not_said_nor_read_after(bus, link):
+def test_what_was_decided_and_seen_before_is_not_said_nor_read_after(bus, opened):
     first = FakeRobot(bus, 7, NEW)  # both clocks are near each other: the times alone would not tell
-    link.start()
+    remote = opened()
     bus.say(SCAN, LaserScan(first.now(), 0.0, 0.1, 0.1, 5.0, np.ones(3, np.float32)), 7, first.now())
-    assert link.read().scan is not None
-    link.drive(Command(GO, link.now(), answers=1))
+    assert remote.read().scan is not None
+    remote.drive(Command(GO, remote.now(), answers=1))
     wait_for(lambda: len(bus.sent) > 2)  # it is repeated
     first.kill()
     time.sleep(SILENT_S)
     second = FakeRobot(bus, 8, NEW + 0.5, Reason.NO_COMMAND, STOP)
-    wait_for(lambda: link.epoch == 8)
+    wait_for(remote.started_anew)
     bus.sent.clear()
     time.sleep(0.2)
     assert bus.sent == []
     bus.say(SCAN, LaserScan(second.now(), 0.0, 0.1, 0.1, 5.0, np.ones(3, np.float32)), 7, second.now())
-    assert link.read().scan is None
+    assert remote.read().scan is None
     bus.say(SCAN, LaserScan(second.now(), 0.0, 0.1, 0.1, 5.0, np.ones(3, np.float32)), 8, second.now())
-    assert link.read().scan is not None
+    assert remote.read().scan is not None
     second.kill()
 
 
-def test_the_first_neutral_decision_does_not_arm_a_robot_that_was_started_anew(bus, link):
+def test_the_first_neutral_decision_does_not_arm_a_robot_that_was_started_anew(bus, opened):
     first = FakeRobot(bus, 7, OLD)
-    link.start()
+    remote = opened()
     first.kill()
     time.sleep(SILENT_S)
     second = FakeRobot(bus, 8, NEW, Reason.NO_COMMAND, STOP)
-    wait_for(lambda: link.epoch == 8)
+    wait_for(remote.started_anew)
     time.sleep(0.1)
     bus.sent.clear()
-    assert link.drive(Command(STOP, link.now(), answers=1)).reason in HELD
+    assert remote.drive(Command(STOP, remote.now(), answers=1)).reason in HELD
     assert bus.sent == []
-    link.drive(Command(STOP, link.now(), answers=2))  # now that the caller knows, it is a decision
+    remote.drive(Command(STOP, remote.now(), answers=2))  # now that the caller knows, it is a decision
     assert bus.sent
     second.kill()
 
 
-def test_who_speaks_between_the_words_of_the_robot_is_not_listened_to(bus, link):
+def test_who_speaks_between_the_words_of_the_robot_is_not_listened_to(bus, opened):
     robot = FakeRobot(bus, 7, OLD)
-    link.start()
+    remote = opened()
     for _ in range(20):
         bus.say(APPLIED, Applied(STOP, 5.0, Source.POLICY), 8, 5.0)
         time.sleep(0.01)
-    assert link.epoch == 7
-    assert link.now() == pytest.approx(robot.now(), abs=0.2)
+    assert not remote.started_anew()
+    assert remote.now() == pytest.approx(robot.now(), abs=0.2)
     robot.kill()
+
+
+def test_another_robot_that_comes_in_its_place_is_not_driven(bus, opened):
+    first = FakeRobot(bus, 7, OLD)
+    remote = opened()
+    first.kill()
+    bus.info = Info(load_profile("rosbot2"), REALTIME, 8)
+    time.sleep(SILENT_S)
+    second = FakeRobot(bus, 8, NEW)
+    try:
+        with pytest.raises(BusError, match=r"'rosbot2' \(realtime\) came back in place of 'thesis-sim'"):
+            wait_for(remote.started_anew)
+    finally:
+        second.kill()
+
+
+def test_a_robot_that_is_never_heard_is_an_error_and_leaves_no_thread(bus, opened, monkeypatch):
+    monkeypatch.setattr("lira.hal.client.realtime.HEAR_S", 0.1)
+    with pytest.raises(BusError, match="says nothing"):
+        opened()
+    wait_for(lambda: not any(thread.name.startswith("remote-") for thread in threading.enumerate()))

@@ -5,7 +5,8 @@ from wiring import PROFILE, joined, remote, served, wait_for
 
 from lira.hal.bus.services import press_estop, release_estop
 from lira.hal.bus.topics import APPLIED, CMD_VEL, IN_LOCKSTEP
-from lira.hal.client.remote import RemoteArena, RemoteRobot
+from lira.hal.client.connect import open_remote
+from lira.hal.client.remote import RemoteArena
 from lira.hal.errors import BusError
 from lira.hal.messages import STOP, Command, Episode, Reason, Source, Twist
 from lira.hal.testing import NullRobot
@@ -155,12 +156,10 @@ def test_a_twin_that_refuses_to_reset_says_why():
         assert policy(client, STOP).reason is Reason.OK
 
 
-def test_before_open_and_after_close_it_says_so(robot):
+def test_after_close_it_says_so(robot):
     with joined(robot) as bus:
-        client = RemoteRobot(bus)
-        with pytest.raises(BusError, match="open"):
-            client.now()
-        client.open()
+        client = open_remote(bus)
         client.close()
-        with pytest.raises(BusError, match="open"):
-            client.now()
+        for asked in (client.now, client.read, client.state, lambda: client.drive(Command(STOP, 0.0))):
+            with pytest.raises(BusError, match="closed"):
+                asked()

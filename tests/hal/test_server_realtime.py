@@ -11,8 +11,9 @@ from wiring import PROFILE, StuckRobot, joined, new_endpoint, new_name, real_tim
 from lira.hal.bus.bus import Bus
 from lira.hal.bus.publisher import Publisher
 from lira.hal.bus.topics import APPLIED, CMD_VEL, DEPTH
+from lira.hal.client.connect import open_remote
 from lira.hal.client.realtime import DECISION_S
-from lira.hal.client.remote import RemoteArena, RemoteRobot
+from lira.hal.client.remote import RemoteArena
 from lira.hal.errors import BusError, DeviceError
 from lira.hal.messages import STOP, Applied, Command, Episode, Reason, Source, Twist
 from lira.hal.messages.codec import encode
@@ -60,7 +61,7 @@ def test_no_thread_of_a_robots_process_holds_the_interpreter_for_long_while_the_
 def test_who_has_not_heard_that_the_robot_stopped_does_not_arm_it_with_a_zero():
     with served(real_time_null()) as robot, remote(robot) as client:
         get_going(client)
-        wait_for(lambda: client.link._newest.reason is Reason.STALE)
+        wait_for(lambda: client._newest.reason is Reason.STALE)
         told = client.drive(Command(STOP, client.now(), answers=1))
         assert told.reason is Reason.STALE
         time.sleep(0.2)
@@ -214,12 +215,8 @@ def test_a_replayed_or_future_command_moves_nothing():
 def test_nobody_there_is_said_with_the_remedy():
     bus = Bus("nobody", connect=new_endpoint())
     try:
-        robot = RemoteRobot(bus, answer_s=0.2)
-        with pytest.raises(BusError, match="not open"):
-            robot.read()
         with pytest.raises(BusError, match=r"no robot named 'nobody'.*lira twin"):
-            robot.open()
-        robot.close()
+            open_remote(bus, answer_s=0.2)
     finally:
         bus.close()
 

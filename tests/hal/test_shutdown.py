@@ -5,7 +5,7 @@ import time
 from wiring import new_endpoint, real_time_null, served, wait_for
 
 from lira.hal.bus.bus import Bus
-from lira.hal.client.remote import RemoteRobot
+from lira.hal.client.connect import open_remote
 from lira.hal.messages import STOP, Command, Twist
 from lira.hal.profile import STOP_BUDGET_S
 from lira.tools.launch.link_fault import Relay
@@ -18,8 +18,7 @@ def test_both_ends_close_in_time_though_the_link_is_dead():
         front = new_endpoint()
         with Relay(int(front.split(":")[1]), int(robot.endpoint.split(":")[1])) as relay:
             bus = Bus(robot.name, connect=front)
-            client = RemoteRobot(bus)
-            client.open()
+            client = open_remote(bus)
             wait_for(lambda: client.drive(Command(STOP, client.now())).reason == "ok")
             wait_for(lambda: client.drive(Command(GO, client.now())).twist == GO)
             relay.faults.dark = True

@@ -9,7 +9,7 @@ from wiring import new_endpoint, new_name, wait_for
 
 from lira.hal.bus.bus import Bus
 from lira.hal.bus.topics import APPLIED
-from lira.hal.client.remote import RemoteRobot
+from lira.hal.client.connect import open_remote
 from lira.hal.messages import STOP, Command, Reason, Twist
 from lira.hal.profile import STOP_BUDGET_S
 from lira.tools.bench.parts import null_robot
@@ -19,9 +19,8 @@ DRIVER = """
 import sys
 from lira.hal.bus.bus import Bus
 from lira.hal.messages import STOP, Command, Twist
-from lira.hal.client.remote import RemoteRobot
-robot = RemoteRobot(Bus(sys.argv[1], connect=sys.argv[2]))
-robot.open()
+from lira.hal.client.connect import open_remote
+robot = open_remote(Bus(sys.argv[1], connect=sys.argv[2]))
 for step in range(1000):
     robot.drive(Command(STOP if step < 3 else Twist(0.5, 0.0), robot.now(), answers=robot.read().seq))
     robot.wait(robot.now() + robot.profile.period_s)
@@ -71,8 +70,7 @@ def test_a_driver_that_dies_stops_the_wheels_in_time(address, bus, number):
     assert still.reason is Reason.STALE
     assert still.stamp_s - last_command_s <= STOP_BUDGET_S + 0.05
     # Nothing moves it but a neutral command, and then it goes on.
-    robot = RemoteRobot(bus)
-    robot.open()
+    robot = open_remote(bus)
     go = Twist(0.25, 0.0)
     wait_for(lambda: robot.drive(Command(go, robot.now())).reason is Reason.NEUTRAL_FIRST)
     wait_for(lambda: robot.drive(Command(STOP, robot.now())).reason is Reason.OK)
@@ -81,8 +79,7 @@ def test_a_driver_that_dies_stops_the_wheels_in_time(address, bus, number):
 
 
 def test_sigterm_stops_the_wheels_and_ends_the_server(address, server, bus):
-    robot = RemoteRobot(bus)
-    robot.open()
+    robot = open_remote(bus)
     wait_for(lambda: robot.drive(Command(STOP, robot.now())).reason is Reason.OK)
     wait_for(lambda: robot.drive(Command(Twist(0.5, 0.0), robot.now())).twist != STOP)
     server._process.send_signal(signal.SIGTERM)
@@ -95,6 +92,5 @@ def test_a_second_server_of_the_same_name_is_refused_and_the_first_goes_on(addre
     done = subprocess.run(again, capture_output=True, text=True, timeout=30, check=False)
     assert done.returncode != 0
     assert "already runs" in done.stderr
-    robot = RemoteRobot(bus)
-    robot.open()
+    robot = open_remote(bus)
     robot.close()

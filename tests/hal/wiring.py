@@ -4,12 +4,13 @@ import threading
 import time
 import uuid
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import closing, contextmanager
 from typing import Any
 
 from lira.hal.bus.bus import Bus
 from lira.hal.bus.publisher import Publisher
 from lira.hal.bus.topics import CMD_VEL, Topic
+from lira.hal.client.connect import open_remote
 from lira.hal.client.remote import RemoteRobot
 from lira.hal.messages import Observation
 from lira.hal.profile import load_profile
@@ -123,13 +124,8 @@ def ready(bus: Bus, topic: Topic[Any] = CMD_VEL) -> Publisher[Any]:
 
 @contextmanager
 def remote(robot: Served) -> Iterator[RemoteRobot]:
-    with joined(robot) as bus:
-        client = RemoteRobot(bus)
-        client.open()
-        try:
-            yield client
-        finally:
-            client.close()
+    with joined(robot) as bus, closing(open_remote(bus)) as client:
+        yield client
 
 
 def wait_for(condition: Callable[[], bool], timeout_s: float = 20.0) -> None:

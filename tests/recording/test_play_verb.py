@@ -8,7 +8,7 @@ from test_record_verb import wait_for
 
 from lira.hal.bus.bus import Bus
 from lira.hal.bus.topics import SCAN
-from lira.hal.client.remote import connect
+from lira.hal.client.connect import connect
 from lira.hal.messages import STOP, Command, Reason, Twist
 from lira.tools.cli import main
 from lira.tools.launch.processes import ChildProcess, free_port, lira_command

@@ -8,8 +8,8 @@ import pytest
 from samples import battery, drive, odom, sample, write
 
 from lira.hal.bus.bus import Bus
-from lira.hal.bus.services import LOCKSTEP, info_from_json
-from lira.hal.bus.topics import BATTERY, CAMERA, DECISION, INFO, ODOM, SCAN
+from lira.hal.bus.services import LOCKSTEP, ask_info
+from lira.hal.bus.topics import BATTERY, CAMERA, DECISION, ODOM, SCAN
 from lira.tools.bench.parts.samples import DECISION as A_DECISION
 from lira.tools.launch.processes import free_port
 from lira.tools.recording.player import Player
@@ -61,7 +61,7 @@ def test_who_asks_is_told_of_the_robot_and_comes_late_hears_what_is_latched(tmp_
     player = Player(Recording(tmp_path / "rec"), robot, speed=0.5)
     stop, thread = playing(player, 1.0)
     try:
-        info = info_from_json(watch.ask(INFO, timeout_s=10.0))
+        info = ask_info(watch, 10.0)
         assert (info.profile.name, info.mode) == ("thesis-sim", LOCKSTEP)
         reader, until_s = watch.reader(BATTERY), time.monotonic() + 10.0
         while reader.newest() is None:

@@ -2,13 +2,13 @@
 
 import threading
 import time
-from contextlib import contextmanager
+from contextlib import closing, contextmanager
 
 from rmw_peer import RmwPeer
 from ros2_peer import Peer
 
 from lira.hal.bus.bus import Bus
-from lira.hal.client.remote import RemoteRobot
+from lira.hal.client.connect import open_remote
 from lira.hal.messages import STOP, Command, Reason, Twist
 from lira.hal.profile import load_profile
 from lira.hal.ros_graph.node import RosNode
@@ -38,12 +38,10 @@ def served(interface=Interface(), namespace="", *, rmw=False, hashes=None, **pee
     server = threading.Thread(target=HalServer(governed, near).run, args=(stop,))
     server.start()
     bus = Bus(name, connect=endpoint)
-    client = RemoteRobot(bus, answer_s=10.0)
     try:
-        client.open()
-        yield robot, client
+        with closing(open_remote(bus, answer_s=10.0)) as client:
+            yield robot, client
     finally:
-        client.close()
         stop.set()
         server.join(10.0)
         for each in (bus, near, far):

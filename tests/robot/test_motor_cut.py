@@ -2,12 +2,12 @@
 
 import threading
 import time
-from contextlib import contextmanager
+from contextlib import closing, contextmanager
 
 from lira.hal.bus.bus import Bus
 from lira.hal.bus.services import press_estop, release_estop
 from lira.hal.bus.topics import ESTOP
-from lira.hal.client.remote import RemoteRobot
+from lira.hal.client.connect import open_remote
 from lira.hal.messages import STOP, Bool, Command, Odometry, Reason, Twist
 from lira.hal.profile import load_profile
 from lira.hal.safety.governed import GovernedRobot
@@ -50,12 +50,10 @@ def base_on_the_bus(path):
     server = threading.Thread(target=HalServer(robot, served).run, args=(stop,))
     server.start()
     bus = Bus(name, connect=endpoint)
-    client = RemoteRobot(bus, answer_s=10.0)
     try:
-        client.open()
-        yield board, wheels, wire, client
+        with closing(open_remote(bus, answer_s=10.0)) as client:
+            yield board, wheels, wire, client
     finally:
-        client.close()
         stop.set()
         server.join(10.0)
         assert bus.close()

@@ -4,7 +4,7 @@ import sys
 import time
 
 from lira.hal.bus.bus import Bus
-from lira.hal.client.remote import RemoteRobot
+from lira.hal.client.connect import open_remote
 from lira.hal.messages import STOP, Command, Reason, Twist
 from lira.hal.profile import load_profile
 from lira.sim_backend.emulators.core2 import Firmware
@@ -66,8 +66,7 @@ def test_the_twin_behind_its_devices_is_driven_over_the_bus(tmp_path):
         with ChildProcess("the robot", command, tmp_path / "lira.robot.log") as server:
             server.wait_ready("serves", 60.0)
             bus = Bus(name, connect=endpoint)
-            robot = RemoteRobot(bus)
-            robot.open()
+            robot = open_remote(bus)
             seen, moved = set(), False
             until_s = time.monotonic() + 15.0
             while not (moved and seen >= {"scan", "image", "odom", "imu"}) and time.monotonic() < until_s:
@@ -99,8 +98,7 @@ def test_the_lidars_plug_pulled_mid_drive_stops_it_within_half_a_second_and_it_r
         with ChildProcess("the robot", command, tmp_path / "lira.robot.log") as server:
             server.wait_ready("serves", 60.0)
             bus = Bus(name, connect=endpoint)
-            robot = RemoteRobot(bus)
-            robot.open()
+            robot = open_remote(bus)
             drive(robot, STOP, lambda applied: applied.reason is Reason.OK)
             drive(robot, GO, lambda _: wired.state().linear_m_s > 0.1)
             wired.lidar_wire.unplug()

@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 from foreign import foreign_environment, ros_share, sdk_command
 
-from lira.hal.client.remote import connect
+from lira.hal.client.connect import connect
 from lira.tools.cli import main
 from lira.tools.launch.processes import ChildProcess, free_port, lira_command
 

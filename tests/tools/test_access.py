@@ -10,9 +10,9 @@ from zenoh import ext
 from lira.hal.bus.attachment import Attachment, parse_attachment
 from lira.hal.bus.bus import Bus
 from lira.hal.bus.keys import load_keys
-from lira.hal.bus.services import info_from_json, look_at_estop, press_estop, release_estop
+from lira.hal.bus.services import ask_info, look_at_estop, press_estop, release_estop
 from lira.hal.bus.topics import BATTERY, ESTOP_LOOK, ESTOP_PRESS, ESTOP_RELEASE, INFO, RESET
-from lira.hal.client.remote import RemoteRobot
+from lira.hal.client.connect import open_remote
 from lira.hal.errors import BusError, ConfigError
 from lira.hal.messages import STOP, BatteryState, Command, Reason, Twist
 from lira.hal.messages.codec import encode
@@ -68,7 +68,7 @@ def test_nobody_else_answers_for_the_robot(folder, robot, who, mode):
             time.sleep(0.5)
             for _ in range(5):
                 assert "forged" not in look_at_estop(laptop).refused
-                assert info_from_json(laptop.ask(INFO)).profile.name == "thesis-sim"
+                assert ask_info(laptop).profile.name == "thesis-sim"
             assert "forged" not in press_estop(laptop).refused
             assert declared
     finally:
@@ -117,8 +117,7 @@ def test_what_is_latched_comes_from_the_robot_alone(folder, who, mode):
 def test_who_copies_what_is_public_neither_drives_nor_starves_nor_leaves_for_another(folder, robot):
     endpoint, _ = robot
     bus = Bus(NAME, connect=endpoint, keys=load_keys(folder / "laptop"))
-    client = RemoteRobot(bus)
-    client.open()
+    client = open_remote(bus)
     try:
         drive_until(client, STOP, lambda applied: applied.reason is Reason.OK)
         drive_until(client, GO, lambda applied: applied.twist == GO)

@@ -18,7 +18,7 @@ from lira.fusion.log.label_log import Demonstration, DemonstrationLog
 from lira.fusion.policies.networks import ExpertNet
 from lira.fusion.preprocess import Features, shapes_of
 from lira.hal.bus.bus import Bus
-from lira.hal.client import remote
+from lira.hal.client import connect
 from lira.hal.profile import load_profile
 from lira.hal.safety.governed import GovernedRobot
 from lira.hal.server.server import HalServer
@@ -146,7 +146,7 @@ def test_a_folder_that_cannot_be_made_is_named(address, refused, tmp_path, teach
 
 
 def test_no_robot_at_the_endpoint_says_how_to_start_one(refused, monkeypatch):
-    monkeypatch.setattr(remote, "RemoteRobot", partial(remote.RemoteRobot, answer_s=0.3))
+    monkeypatch.setattr(connect, "open_remote", partial(connect.open_remote, answer_s=0.3))
     endpoint = f"127.0.0.1:{free_port()}"
     what, remedy = refused("drive", "--connect", endpoint, "camera-expert")
     assert what == f"lira drive: no robot named 'rosbot' answers 'info' at {endpoint}"

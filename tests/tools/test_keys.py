@@ -11,7 +11,7 @@ from lira.hal.bus.bus import Bus
 from lira.hal.bus.keys import KEY, ROLES, load_keys
 from lira.hal.bus.services import look_at_estop, press_estop
 from lira.hal.bus.topics import APPLIED, CMD_VEL, DIAGNOSTICS, JOY, OPERATOR, SIM_STATE
-from lira.hal.client.remote import RemoteRobot
+from lira.hal.client.connect import open_remote
 from lira.hal.errors import BusError, ConfigError
 from lira.hal.messages import STOP, Joy, OperatorRequest, Reason, Request
 from lira.hal.messages.codec import encode
@@ -36,8 +36,7 @@ def robot(folder):
 @pytest.mark.parametrize("who", ["laptop", "anna"])
 def test_who_is_enrolled_drives_on_two_encrypted_links(folder, robot, who):
     bus = Bus(NAME, connect=robot[0], keys=load_keys(folder / who))
-    client = RemoteRobot(bus)
-    client.open()
+    client = open_remote(bus)
     deadline_s = time.monotonic() + 5.0
     while bus.links() != 2 and time.monotonic() < deadline_s:
         time.sleep(0.05)

@@ -17,7 +17,8 @@ from lira.fusion.policies.networks import ExpertNet
 from lira.fusion.preprocess import Features
 from lira.hal.profile import load_profile
 from lira.tools.cli import main
-from lira.tools.runs.folder import LABELS, NOVICE, RECORD, snapshot
+from lira.tools.runs.folder import snapshot
+from lira.tools.runs.names import LABELS, NOVICE, RECORD
 
 SIM = load_profile("thesis-sim")
 HEAD = RunRecord("line-obstacles", SIM.name, "plus", "plus", 0, 0, "lira demo", "0")

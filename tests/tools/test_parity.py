@@ -194,10 +194,9 @@ def test_somebody_else_at_the_wheel_is_an_error():
         other, stop = Bus(bus.robot, connect=bus.endpoint), threading.Event()
 
         def drive():
-            from lira.hal.client.remote import RemoteRobot
+            from lira.hal.client.connect import open_remote
 
-            robot = RemoteRobot(other)
-            robot.open()
+            robot = open_remote(other)
             while not stop.is_set():
                 robot.drive(Command(Twist(0.0, 0.0), robot.now()))
                 robot.wait(robot.now() + 0.05)

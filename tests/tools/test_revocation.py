@@ -10,7 +10,7 @@ from keyed_bed import GO, NAME, drive_until, make_keys, serving, wait_for
 from lira.hal.bus.bus import Bus
 from lira.hal.bus.keys import CA, CERTIFICATE, KEY, ROLES, load_keys
 from lira.hal.bus.services import look_at_estop
-from lira.hal.client.remote import RemoteRobot
+from lira.hal.client.connect import open_remote
 from lira.hal.errors import BusError
 from lira.hal.messages import STOP, Command, Reason
 from lira.tools.authority import enroll, enrolled, renew
@@ -28,8 +28,7 @@ def folder(tmp_path):
 @contextmanager
 def driving(folder, endpoint, who):
     bus = Bus(NAME, connect=endpoint, keys=load_keys(folder / who))
-    client = RemoteRobot(bus)
-    client.open()
+    client = open_remote(bus)
     try:
         drive_until(client, STOP, lambda applied: applied.reason is Reason.OK)
         drive_until(client, GO, lambda applied: applied.twist == GO)

@@ -6,7 +6,7 @@ import msgspec
 import pytest
 
 from lira.hal.bus.bus import Bus
-from lira.hal.client.remote import RemoteArena, RemoteRobot
+from lira.hal.client.connect import open_remote
 from lira.hal.messages import STOP, Command, Twist
 from lira.sim_backend.catalogue import load_world
 from lira.sim_backend.world import World
@@ -100,9 +100,8 @@ def test_whoever_connects_learns_the_world_and_can_drive(tmp_path):
     with ChildProcess("the twin", command, tmp_path / "log") as twin:
         twin.wait_ready("serves world", 60.0)
         bus = Bus(name, connect=endpoint)
-        robot = RemoteRobot(bus)
-        robot.open()
-        arena = RemoteArena(robot)
+        robot = open_remote(bus)
+        arena = robot.arena
         world = msgspec.structs.replace(load_world("race"), randomised=True)
         assert msgspec.json.decode(arena.info, type=World) == world
         before = arena.state()

@@ -12,7 +12,7 @@ import pytest
 
 from lira.hal.bus.bus import Bus
 from lira.hal.bus.topics import APPLIED
-from lira.hal.client.remote import RemoteRobot
+from lira.hal.client.connect import connect
 from lira.hal.messages import STOP, Command, Source, Twist
 from lira.tools.bench.parts import null_robot
 from lira.tools.launch.processes import ChildProcess, free_port, lira_command
@@ -25,9 +25,7 @@ needs_browser = pytest.mark.skipif(bool(missing), reason=f"needs {' and '.join(m
 @contextlib.contextmanager
 def policy(name, endpoint):
     """Drives on and on, and never asks a robot that has stopped to move again: that is for a person."""
-    stop, bus = threading.Event(), Bus(name, connect=endpoint)
-    robot = RemoteRobot(bus)
-    robot.open()
+    stop = threading.Event()
 
     def drive():
         robot.drive(Command(STOP, robot.now(), answers=robot.read().seq))
@@ -35,15 +33,14 @@ def policy(name, endpoint):
             robot.drive(Command(Twist(0.3, 0.0), robot.now(), answers=robot.read().seq))
             robot.wait(robot.now() + robot.profile.period_s)
 
-    thread = threading.Thread(target=drive)
-    thread.start()
-    try:
-        yield
-    finally:
-        stop.set()
-        thread.join()
-        robot.close()
-        bus.close()
+    with connect(endpoint, name) as robot:
+        thread = threading.Thread(target=drive)
+        thread.start()
+        try:
+            yield
+        finally:
+            stop.set()
+            thread.join()
 
 
 @contextlib.contextmanager

@@ -13,9 +13,8 @@ from tempfile import TemporaryDirectory
 import numpy as np
 
 from lira.hal.bus.attachment import Attachment
-from lira.hal.bus.bus import Bus
 from lira.hal.bus.topics import APPLIED, SCAN
-from lira.hal.client.remote import RemoteRobot
+from lira.hal.client.connect import connect
 from lira.hal.errors import BusError
 from lira.hal.messages import STOP, Command, LaserScan
 from lira.hal.messages.codec import encode
@@ -70,12 +69,9 @@ def measure() -> dict[str, float]:
 
 def measure_stack(name: str, endpoint: str) -> tuple[list[float], LaserScan]:
     """Answer every scan at once, and find when each answer was applied."""
-    bus = Bus(name, connect=endpoint)
-    robot = RemoteRobot(bus)
-    try:
-        robot.open()
-        results = bus.reader(APPLIED, depth=64)
-        scans = bus.reader(SCAN)
+    with connect(endpoint, name) as robot:
+        results = robot.bus.reader(APPLIED, depth=64)
+        scans = robot.bus.reader(SCAN)
         captured_s: dict[int, float] = {}
         taken_ms: dict[int, float] = {}
         deadline_s = time.monotonic() + LIMIT_S
@@ -94,9 +90,6 @@ def measure_stack(name: str, endpoint: str) -> tuple[list[float], LaserScan]:
         if newest is None or len(taken_ms) < SCANS + WARM_UP:
             raise BusError(f"{len(taken_ms)} of {SCANS + WARM_UP} commands were applied", "Is the machine overloaded?")
         return list(taken_ms.values())[WARM_UP:], newest.message
-    finally:
-        robot.close()
-        bus.close()
 
 
 def measure_echo(endpoint: str, scan: LaserScan) -> list[float]:

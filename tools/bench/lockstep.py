@@ -22,11 +22,13 @@ from lira.fusion.log.run_log import RunWriter
 from lira.fusion.methods.base import Method
 from lira.fusion.methods.presets import METHODS
 from lira.hal.bus.topics import DECISION
-from lira.hal.client.remote import RemoteArena, RemoteRobot, connect
+from lira.hal.client.connect import connect
+from lira.hal.client.remote import RemoteArena, RemoteRobot
 from lira.hal.messages import Episode, Phase
 from lira.tools.bench import Row
 from lira.tools.launch.processes import ChildProcess, free_port, lira_command
 from lira.tools.runs.build import build_method
+from lira.tools.runs.names import LABELS, RECORD
 
 RUNS = 3
 WORLD = "race"
@@ -78,11 +80,11 @@ def drive(robot: RemoteRobot, layout: int, folder: Path) -> dict[str, float]:
     method = build_method(begun, profile, layout, partial(ProcessTrainer, adopt_after_s=profile.period_s))
     decisions = robot.bus.publisher(DECISION)
     try:
-        with DemonstrationLog(folder / "labels.lira", profile) as log, RunWriter(folder / "run.jsonl") as record:
+        with DemonstrationLog(folder / LABELS, profile) as log, RunWriter(folder / RECORD) as record:
             journal = Journal(
                 keep=log.append, write=record.write, publish=lambda decision: decisions.put(decision, robot.now())
             )
-            loop = ControlLoop(robot, truth=RemoteArena(robot).state)
+            loop = ControlLoop(robot, truth=robot.state)
             loop.arm()
             drive_until(WARM_UP_S, robot, layout, loop, method, journal)
             began = time.perf_counter(), robot.now()
@@ -107,7 +109,6 @@ def drive_until(
     journal: Journal,
 ) -> None:
     """Drive until the robot's clock says so; after a crash or at the end it is put down anew."""
-    arena = RemoteArena(robot)
     while robot.now() < end_s:
         step = loop.step(method)
         if step is None:
@@ -116,5 +117,5 @@ def drive_until(
         state = step.state
         if state is not None and (state.collided or state.lost or state.finished):
             start_m = 0.0 if state.finished else max(state.progress_m, 0.0) + PUT_ON_M
-            arena.reset(Episode(layout, start_m=start_m))
+            RemoteArena(robot).reset(Episode(layout, start_m=start_m))
             method.reset()

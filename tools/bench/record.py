@@ -13,9 +13,9 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
-from lira.hal.bus.bus import Bus
 from lira.hal.bus.reader import Reader, Tap
 from lira.hal.bus.topics import APPLIED, SCAN
+from lira.hal.client.connect import connect, on_bus
 from lira.hal.client.remote import RemoteRobot
 from lira.hal.messages import Applied, Command, LaserScan, Twist
 from lira.tools.bench import Row
@@ -106,15 +106,8 @@ class Pair:
 @contextmanager
 def driver(name: str, endpoint: str) -> Iterator[Pair]:
     """Open both ends."""
-    bus, watch = Bus(name, connect=endpoint), Bus(name, connect=endpoint, watch=True)
-    robot = RemoteRobot(bus)
-    try:
-        robot.open()
-        yield Pair(robot, bus.reader(SCAN), bus.reader(APPLIED, depth=64), watch.tap())
-    finally:
-        robot.close()
-        watch.close()
-        bus.close()
+    with connect(endpoint, name) as robot, on_bus(endpoint, name, watch=True) as watch:
+        yield Pair(robot, robot.bus.reader(SCAN), robot.bus.reader(APPLIED, depth=64), watch.tap())
 
 
 def drive(pair: Pair, seconds: float, half: Half) -> Heard:

@@ -19,6 +19,7 @@ import msgspec
 from lira.hal.bus.bus import Bus
 from lira.hal.bus.services import press_estop, release_estop
 from lira.hal.bus.topics import APPLIED, RESET
+from lira.hal.client.connect import on_bus
 from lira.hal.errors import ConfigError
 from lira.hal.messages import STOP, Episode, Source
 from lira.tools.bench import Row
@@ -135,8 +136,7 @@ def run(minutes: float = MINUTES) -> list[Row]:
             start("joystick bridge", [*python, hand.__name__, name, endpoint, str(ear)], hand.READY),
             start("console ears", [*python, watcher.__name__, name, endpoint], watcher.READY),
         ]
-        bus = Bus(name, connect=endpoint)
-        stack.callback(bus.close)
+        bus = stack.enter_context(on_bus(endpoint, name))
         work = watch(watched, bus, ear, minutes * 60.0)
     return [*(one.row() for one in watched), work.row()]
 

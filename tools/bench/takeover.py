@@ -20,10 +20,9 @@ from typing import Protocol
 
 import numpy as np
 
-from lira.hal.bus.bus import Bus
 from lira.hal.bus.reader import Reader
 from lira.hal.bus.topics import APPLIED
-from lira.hal.client.remote import RemoteRobot
+from lira.hal.client.connect import connect, on_bus
 from lira.hal.errors import BusError
 from lira.hal.messages import HELD, STOP, Applied, Command, Source, Twist
 from lira.tools.bench import Row
@@ -129,7 +128,7 @@ def measure(name: str, endpoint: str, thumb: Thumb) -> list[float]:
     rng = random.Random(0)
     taken_ms: list[float] = []
     missed = 0
-    with bus_of(name, endpoint, watch=True) as bus:
+    with on_bus(endpoint, name, watch=True) as bus:
         applied = bus.reader(APPLIED, depth=64)
         while len(taken_ms) < SAMPLES + WARM_UP:
             until(applied, lambda result: result.source is Source.POLICY and result.twist != STOP)
@@ -161,21 +160,10 @@ def until(reader: Reader[Applied], condition: Callable[[Applied], bool]) -> floa
 
 
 @contextmanager
-def bus_of(name: str, endpoint: str, *, watch: bool = False) -> Iterator[Bus]:
-    """A bus for a while."""
-    bus = Bus(name, connect=endpoint, watch=watch)
-    try:
-        yield bus
-    finally:
-        bus.close()
-
-
-@contextmanager
 def policy(name: str, endpoint: str) -> Iterator[None]:
     """Something that drives at the robot's control rate."""
-    with bus_of(name, endpoint) as bus:
-        robot, stop = RemoteRobot(bus), threading.Event()
-        robot.open()
+    with connect(endpoint, name) as robot:
+        stop = threading.Event()
 
         def drive() -> None:
             go = STOP
@@ -187,13 +175,12 @@ def policy(name: str, endpoint: str) -> Iterator[None]:
 
         with running(drive, stop):
             yield
-        robot.close()
 
 
 @contextmanager
 def bridge(name: str, endpoint: str, pad: PipePad) -> Iterator[None]:
     """The bridge on that pad."""
-    with bus_of(name, endpoint) as bus, bus_of(name, endpoint, watch=True) as watch:
+    with on_bus(endpoint, name) as bus, on_bus(endpoint, name, watch=True) as watch:
         stop = threading.Event()
         loop = Bridge(TeleopClient(bus, watch, READY_S, lambda _: None), lambda: pad, PadMemory(None), lambda _: None)
         with running(lambda: loop.run(stop), stop):

@@ -6,7 +6,7 @@ import time
 from contextlib import closing
 
 from lira.hal.bus.bus import Bus
-from lira.hal.bus.services import info_from_json
+from lira.hal.bus.services import ask_info
 from lira.hal.bus.topics import INFO, ODOM, SCAN
 from lira.tools.doctor.finding import Finding, Patient, fail, need, ok, warn
 
@@ -21,7 +21,7 @@ POLL_S = 0.005
 def robot(patient: Patient) -> list[Finding]:
     """Ask the robot, again and again; then listen for what it sends."""
     with closing(Bus(patient.name, connect=need(patient.connect))) as bus:
-        info = info_from_json(bus.ask(INFO, timeout_s=ANSWER_S))
+        info = ask_info(bus, ANSWER_S)
         findings = [ok(f"robot '{patient.name}', profile {info.profile.name}, {info.mode}", mode=str(info.mode))]
         findings.append(_round_trip(bus))
         findings.append(_links(bus))

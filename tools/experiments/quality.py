@@ -12,7 +12,7 @@ from typing import Literal
 
 import msgspec
 
-from lira.fusion.control import ControlLoop, Teacher
+from lira.fusion.control import Teacher
 from lira.fusion.learning.kernel_novice import KernelNovice
 from lira.fusion.log.recorder import Journal
 from lira.fusion.log.run_log import LapRecord, Pose, Record, ResultRecord, StepRecord
@@ -140,9 +140,7 @@ def teach_to(
     robots: Fleet,
 ) -> tuple[ResultRecord, list[Point], list[Judged]]:
     """Teach for at most the course's laps; `judge` tries who reached a level, `robots` show how good the novice is."""
-    loop = ControlLoop(robot, truth=robot.arena.state)
-    session = Session(robot, robot.arena, loop, journal, method, method.alone)
-    loop.arm()
+    session = Session(robot, robot.arena, journal, method, method.alone)
     points: list[Point] = []
     judged: list[Judged] = []
     waiting, more = list(quality.levels), quality.more
@@ -247,9 +245,7 @@ def _answered(
         simulate(world, profile, layout=drives[0].episode.layout, renderer="sketch") as robot,
         hand(profile, world) as answering,
     ):
-        loop = ControlLoop(robot, truth=robot.arena.state)
-        session = Session(robot, robot.arena, loop, Journal(write=tape.write), None, lambda _: driver)
-        loop.arm()
+        session = Session(robot, robot.arena, Journal(write=tape.write), None, lambda _: driver)
         return session.show(drives, answering), tape.driven_m
 
 

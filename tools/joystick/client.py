@@ -8,12 +8,11 @@ import threading
 from collections.abc import Callable
 
 from lira.hal.bus.bus import Bus
-from lira.hal.bus.services import LOCKSTEP, info_from_json, press_estop, release_estop
+from lira.hal.bus.services import LOCKSTEP, ask_info, press_estop, release_estop
 from lira.hal.bus.topics import (
     APPLIED,
     DECISION,
     ESTOP,
-    INFO,
     JOY,
     JOY_FEEDBACK,
     OPERATOR,
@@ -49,7 +48,7 @@ class TeleopClient:
     """
 
     def __init__(self, bus: Bus, watch: Bus, answer_s: float, say: Callable[[str], None] = print) -> None:
-        info = info_from_json(bus.ask(INFO, timeout_s=answer_s))
+        info = ask_info(bus, answer_s)
         if info.mode == LOCKSTEP:
             raise BusError("the robot runs in lockstep, which no hand can follow", "Start it without --lockstep.")
         self.profile: RobotProfile = info.profile

@@ -14,7 +14,7 @@ from lira.fusion.log.run_log import RunRecord, read_run
 from lira.fusion.methods.presets import METHODS, Preset
 from lira.fusion.policies.kernel import KernelSettings
 from lira.hal.errors import ConfigError
-from lira.tools.runs.folder import LABELS, NOVICE, RECORD
+from lira.tools.runs.names import LABELS, NOVICE, RECORD
 
 
 def relearn(log: Path) -> tuple[KernelNovice, list[int]]:

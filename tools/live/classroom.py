@@ -2,7 +2,6 @@
 
 import contextlib
 from pathlib import Path
-from types import TracebackType
 from typing import Self
 
 from lira.fusion.experts.tasks import task_of
@@ -17,7 +16,8 @@ from lira.hal.messages import Driver
 from lira.hal.profile import RobotProfile
 from lira.tools.live.before import days_before
 from lira.tools.runs.build import NewTrainer
-from lira.tools.runs.folder import LABELS, RECORD, snapshot
+from lira.tools.runs.folder import snapshot
+from lira.tools.runs.names import LABELS, RECORD
 from lira.tools.runs.plan import Plan, build_traced
 from lira.tools.runs.progress import Publish, Say
 
@@ -81,9 +81,7 @@ class Classroom:
     def __enter__(self) -> Self:
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         with contextlib.closing(self._log):
             self.method.close()
 

@@ -7,10 +7,8 @@ with its twin: what a busy machine or a link adds in real time is proven by the 
 from collections.abc import Iterator, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
 from threading import Event
-from types import TracebackType
 from typing import Self
 
-from lira.fusion.control import ControlLoop
 from lira.fusion.log.recorder import Journal
 from lira.fusion.log.run_log import LapRecord, Record
 from lira.fusion.methods.base import Method
@@ -57,19 +55,14 @@ class Exam:
         self._end = self._pool.submit(self._run)
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self._enough.set()
         self._pool.shutdown()
 
     def _run(self) -> None:
         with simulate(self._world, self._profile, renderer=quickest(self._world)) as robot:
-            loop = ControlLoop(robot, truth=robot.arena.state)
             alone = self._method.alone(Phase.UNSEEN)
-            session = Session(robot, robot.arena, loop, self._journal, self._method, lambda _: alone)
-            loop.arm()
-            session.show(self._left())
+            Session(robot, robot.arena, self._journal, self._method, lambda _: alone).show(self._left())
 
     def _left(self) -> Iterator[Drive]:
         for drive in self._drives:

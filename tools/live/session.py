@@ -77,19 +77,11 @@ class LiveSession:
 
     def result(self) -> ResultRecord:
         """Sum the session up. Contradictions are for whoever knows the log."""
-        ledger = self._journal.ledger
-        return ResultRecord(
+        return self._journal.result(
             converged=self.converged,
             laps=self.board.state.laps,
-            human_labels=ledger.labels.stored_human,
-            demonstration=ledger.labels.demonstration,
-            interventions=ledger.interventions,
-            calls=ledger.calls,
-            buffer=ledger.buffer,
             training_steps=self._novice.training_steps,
             simulated_s=self._driver.now() - self._driver.began_s,
-            elapsed_s=self._journal.elapsed_s,
-            account=ledger.account,
             proof="own",
         )
 

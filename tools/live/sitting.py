@@ -13,7 +13,6 @@ from lira.fusion.log.run_log import RunWriter, VerdictRecord
 from lira.fusion.operator_service import OperatorService
 from lira.hal.bus.topics import SESSION
 from lira.hal.client.remote import RemoteRobot
-from lira.sim_backend.world import World
 from lira.tools.launch.lifetime import saving, stop_or_interrupt
 from lira.tools.live.board import Board
 from lira.tools.live.classroom import Classroom
@@ -23,10 +22,11 @@ from lira.tools.live.session import LiveSession
 from lira.tools.operator.voice import explain
 from lira.tools.recording.beside import recorder_beside
 from lira.tools.runs.course import Course
-from lira.tools.runs.folder import LABELS, RECORD, in_the_log
+from lira.tools.runs.folder import in_the_log
+from lira.tools.runs.names import LABELS, RECORD
 from lira.tools.runs.plan import Plan
 from lira.tools.runs.progress import Say
-from lira.tools.runs.reach import FLOOR, hand_of, reports_of, request_line
+from lira.tools.runs.reach import hand_of, reports_of, request_line, world_in, world_of
 
 
 @dataclass(frozen=True, slots=True)
@@ -39,27 +39,22 @@ class Outcome:
 
 def sit(args: argparse.Namespace, plan: Plan, robot: RemoteRobot, rules: Rules, say: Say) -> Outcome:
     """Teach until the person ends the session, or Ctrl-C does; what was learned is saved however it ends."""
-    world = msgspec.json.decode(robot.info.arena, type=World | None)
-    arena = robot.arena
-    course = None
-    if world is not None:
-        course = Course(robot.profile, world, plan.layout)
-    name = FLOOR if world is None else world.name
+    arena, world = robot.arena, world_in(bytes(robot.info.arena))
+    course = None if world is None else Course(robot.profile, world, plan.layout)
     folder = plan.folder
     assert folder is not None
     publish = reports_of(robot)
     with contextlib.ExitStack() as stack:
         wait_for_recorder = stack.enter_context(recorder_beside(args, folder, say))
         wait_for_recorder()
-        room = stack.enter_context(Classroom(plan, robot.profile, name, ProcessTrainer, say, publish))
+        room = stack.enter_context(Classroom(plan, robot.profile, world_of(robot), ProcessTrainer, say, publish))
         record = stack.enter_context(RunWriter(folder / RECORD))
         record.write(room.head)
         sessions = robot.bus.publisher(SESSION)
         journal = Journal(keep=room.keep, write=record.write, publish=publish)
         room.go_on(journal.ledger)
         hand = stack.enter_context(hand_of(args))
-        truth = None if arena is None else robot.link.state
-        loop = ControlLoop(robot, truth=truth)
+        loop = ControlLoop(robot, truth=None if arena is None else robot.state)
         board = Board(
             rules.person, room.before, journal.ledger, robot.now, lambda state: sessions.put(state, robot.now()), say
         )

@@ -6,8 +6,8 @@ from collections.abc import Callable, Iterator
 from typing import NamedTuple
 
 from lira.hal.bus.bus import Bus
-from lira.hal.bus.services import LOCKSTEP, Info, info_from_json
-from lira.hal.bus.topics import INFO
+from lira.hal.bus.services import LOCKSTEP, Info, ask_info
+from lira.hal.client.connect import on_bus
 from lira.tools.joystick.client import TeleopClient
 from lira.tools.launch.lifetime import CLOSE_S, stop_or_interrupt
 
@@ -30,11 +30,7 @@ class Beside(NamedTuple):
 @contextlib.contextmanager
 def beside(name: str, endpoint: str) -> Iterator[Beside]:
     """Open the sessions. Raises `BusError` if no robot answers."""
-    with contextlib.ExitStack() as stack:
-        bus = Bus(name, connect=endpoint)
-        stack.callback(bus.close, CLOSE_S)
-        stop = stack.enter_context(stop_or_interrupt())
-        info = info_from_json(bus.ask(INFO, timeout_s=ANSWER_S))
-        watch = Bus(name, connect=endpoint, watch=True)
-        stack.callback(watch.close, CLOSE_S)
-        yield Beside(bus, watch, info, stop)
+    with on_bus(endpoint, name, close_s=CLOSE_S) as bus, stop_or_interrupt() as stop:
+        info = ask_info(bus, ANSWER_S)
+        with on_bus(endpoint, name, watch=True, close_s=CLOSE_S) as watch:
+            yield Beside(bus, watch, info, stop)

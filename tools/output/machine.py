@@ -1,5 +1,6 @@
 """What a verb prints where `--json` is: an object for a machine, or the same rows as a table for a person."""
 
+import json
 import os
 import sys
 from pathlib import Path
@@ -21,8 +22,28 @@ def take_stdout() -> TextIO:
     return kept
 
 
+def output_for(file: str | None) -> TextIO:
+    """Return where a verb with `--json FILE` prints: where that is standard output, it is for the JSON alone."""
+    return take_stdout() if file == "-" else sys.stdout
+
+
+def tell(file: str | None, output: TextIO, found: object, words: str | None = None) -> None:
+    """Write what was found to the FILE of `--json`, and print it for whom `output` is: as JSON, or in words, if any.
+
+    What is text already is JSON. Raises `StorageError`.
+    """
+    if file is not None:
+        text = found if isinstance(found, str) else json.dumps(found, indent=2)
+        if file == "-":
+            words = text
+        else:
+            write_file(Path(file), text)
+    if words is not None:
+        print(words, file=output, flush=True)
+
+
 def write_file(path: Path, text: str) -> None:
-    """Write the object. Raises `StorageError`."""
+    """Write a text. Raises `StorageError`."""
     write_whole(path, (text + "\n").encode())
 
 

@@ -7,8 +7,8 @@ from typing import Any, Generic, TypeVar
 from lira.hal.bus.bus import Bus
 from lira.hal.bus.reader import Reader
 from lira.hal.bus.sensors import Stamped
-from lira.hal.bus.services import LOCKSTEP, info_from_json
-from lira.hal.bus.topics import APPLIED, CAMERA, CMD_VEL, IMU, INFO, ODOM, SCAN
+from lira.hal.bus.services import LOCKSTEP, ask_info
+from lira.hal.bus.topics import APPLIED, CAMERA, CMD_VEL, IMU, ODOM, SCAN
 from lira.hal.clock import ClockEstimate
 from lira.hal.errors import BusError, ConfigError
 from lira.hal.messages import STOP, Applied, CompressedImage, Imu, LaserScan, Odometry, Reason, Source, session_of
@@ -70,7 +70,7 @@ def record(bus: Bus, name: str) -> Recording:
     Raises `BusError` if it is not there or does not arm, `InterruptedScriptError` if it stops in between, `ConfigError`
     if it does not run in real time.
     """
-    info = info_from_json(bus.ask(INFO))
+    info = ask_info(bus)
     if info.mode == LOCKSTEP:
         raise ConfigError(f"'{name}' runs in lockstep", "Start its twin without --lockstep: its time has to pass.")
     driver = _Driver(bus, Recording(name, info.profile))

@@ -10,8 +10,8 @@ from pathlib import Path
 from lira.hal.bus.attachment import Attachment, parse_attachment
 from lira.hal.bus.bus import Bus
 from lira.hal.bus.reader import RawSample, Tap
-from lira.hal.bus.services import info_from_json
-from lira.hal.bus.topics import APPLIED, CLOCK, INFO
+from lira.hal.bus.services import ask_info
+from lira.hal.bus.topics import APPLIED, CLOCK
 from lira.hal.errors import BusError, CodecError, LiraError, StorageError
 from lira.tools.recording.backlog import Backlog
 from lira.tools.recording.layout import Head
@@ -36,7 +36,7 @@ def listen(bus: Bus, version: str, command: str, stop: threading.Event) -> tuple
     Raises `BusError` if no robot answers.
     """
     tap = bus.tap()
-    info = info_from_json(bus.ask(INFO, timeout_s=FIRST_S))
+    info = ask_info(bus, FIRST_S)
     heard: list[RawSample] = []
     local_ns = time.time_ns() - time.monotonic_ns()
     until_s = time.monotonic() + FIRST_S

@@ -3,8 +3,8 @@
 from pathlib import Path
 
 from lira.hal.config import write_whole
+from lira.tools.runs.names import RECORD
 
-RECORD = "run.jsonl"
 PAGE = "report.html"
 COMPARISON = "comparison.html"
 

@@ -12,8 +12,9 @@ from collections.abc import Callable
 from contextlib import ExitStack
 
 from lira.hal.bus.bus import Bus
-from lira.hal.bus.services import LOCKSTEP, info_from_json
-from lira.hal.bus.topics import APPLIED, INFO
+from lira.hal.bus.services import LOCKSTEP, ask_info
+from lira.hal.bus.topics import APPLIED
+from lira.hal.client.connect import on_bus
 from lira.hal.clock import ClockEstimate
 from lira.hal.errors import ConfigError
 from lira.hal.messages import Reason
@@ -34,17 +35,16 @@ class Offer:
     """One robot in one graph."""
 
     def __init__(self, bus: Bus, node: RosNode) -> None:
-        info = info_from_json(bus.ask(INFO, timeout_s=FIND_S))
+        info = ask_info(bus, FIND_S)
         if info.mode == LOCKSTEP:
             raise ConfigError("a robot in lockstep is no robot of ROS's", "Run it in real time.")
-        arena = bytes(info.arena) != b"null"
         self._applied = bus.reader(APPLIED, 8)
         self._clock = ClockEstimate()
         self._heard_s = float("-inf")
         self._armed = False
-        self._telemetry = Telemetry(bus, node, said_by(info.profile, arena=arena))
+        self._telemetry = Telemetry(bus, node, said_by(info.profile, arena=info.has_arena))
         self._commands = Commands(bus, node, info.profile.control, secrets.token_bytes(16), self._robot_time)
-        self._services = Services(bus, node, arena=arena)
+        self._services = Services(bus, node, arena=info.has_arena)
 
     def run(self, stop: threading.Event) -> None:
         """Relay until `stop` is set. Raises `BusError` when one of the sessions is closed."""
@@ -89,8 +89,6 @@ def offer(robot: str, address: str, graph: Graph, stop: threading.Event, ready: 
             insecure=True,  # what is not on this machine was asked for (`graph_of`)
         )
         held.callback(node.close)
-        bus = Bus(robot, connect=address)
-        held.callback(bus.close)
-        offered = Offer(bus, node)
+        offered = Offer(held.enter_context(on_bus(address, robot)), node)
         ready()
         offered.run(stop)

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass
 
-from lira.fusion.control import ControlLoop, Teacher
+from lira.fusion.control import Teacher
 from lira.fusion.log.recorder import Journal
 from lira.fusion.log.run_log import ResultRecord
 from lira.fusion.methods.base import Method
@@ -75,14 +75,12 @@ def run_course(
     The teaching happens within `saving`, which keeps what was learned however it ends. A method by which nobody learns
     has its proving runs at once.
     """
-    loop = ControlLoop(robot, truth=arena.state)
 
     def alone(phase: Phase) -> Method:
         driver = method.alone(phase)
         return Shielded(driver, Shield(course.profile)) if course.shield and phase == Phase.UNSEEN else driver
 
-    session = Session(robot, arena, loop, journal, method if method.learns else None, alone)
-    loop.arm()
+    session = Session(robot, arena, journal, method if method.learns else None, alone)
     if method.learns:
         with saving or nullcontext():
             converged = session.teach(course, teacher, course.laps, all_laps=course.all_laps)
@@ -94,9 +92,7 @@ def run_course(
 
 def show_alone(robot: Robot, arena: Arena, method: Method, journal: Journal, course: Course) -> bool:
     """Let a policy drive what is unseen; after a crash it goes on behind it. Returns whether it passed everything."""
-    loop = ControlLoop(robot, truth=arena.state)
-    session = Session(robot, arena, loop, journal, None, lambda _: method)
-    loop.arm()
+    session = Session(robot, arena, journal, None, lambda _: method)
     return all(each.passed for each in session.show(course.shown()))
 
 

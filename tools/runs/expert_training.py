@@ -30,6 +30,7 @@ from lira.hal.profile import RobotProfile, load_profile
 from lira.sim_backend.catalogue import load_world
 from lira.sim_backend.foresight import Foresight, with_small_camera
 from lira.sim_backend.scenes.opening import quickest
+from lira.tools.output.say import say
 from lira.tools.runs.progress import telling
 from lira.tools.runs.simulated import simulate
 
@@ -53,9 +54,7 @@ def train_expert(kind: str, task: str, profile: RobotProfile, seed: int, path: P
         simulate(world, profile, seed=seed, renderer=quickest(world)) as robot,
         closing(ScriptedTeacher(Foresight(profile, world), profile, course.teacher, seed)) as teacher,
     ):
-        loop = ControlLoop(robot, truth=robot.arena.state)
-        session = Session(robot, robot.arena, loop, Journal(write=telling(tell)), HgDagger(novice))
-        loop.arm()
+        session = Session(robot, robot.arena, Journal(write=telling(say)), HgDagger(novice))
         proven = session.teach(Anew(course, seed) if course.proofs else Same(course.drives), teacher, course.laps)
     if not proven:
         asked = f"{course.proofs} fresh laps in a row" if course.proofs else "the lap that was taught"
@@ -66,11 +65,6 @@ def train_expert(kind: str, task: str, profile: RobotProfile, seed: int, path: P
     about = Checkpoint.of(expert, profile.name, command, seed, cruise)
     save_checkpoint(path, expert, replace(about, labels=novice.stored, training_steps=novice.training_steps))
     print(f"{kind} expert: {novice.stored} labels learned, {novice.training_steps} training steps, saved to {path}")
-
-
-def tell(line: str) -> None:
-    """Print a line at once."""
-    print(line, flush=True)
 
 
 def provide(pair: str) -> None:

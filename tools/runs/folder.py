@@ -12,9 +12,7 @@ from lira.fusion.operator_service import Job
 from lira.hal.errors import ConfigError
 from lira.hal.profile import RobotProfile
 from lira.tools.output.proven import contradiction_words
-from lira.tools.runs.names import LABELS as LABELS
-from lira.tools.runs.names import NOVICE as NOVICE
-from lira.tools.runs.names import RECORD as RECORD
+from lira.tools.runs.names import LABELS, NOVICE, RECORD
 
 
 def check_fresh(folder: Path) -> None:

@@ -4,13 +4,11 @@ import argparse
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
-import msgspec
-
 from lira.fusion.operator_service import RequestLine
-from lira.hal.bus.bus import Bus
-from lira.hal.bus.services import LOCKSTEP
+from lira.hal.bus.services import LOCKSTEP, understood
 from lira.hal.bus.topics import DECISION, IN_LOCKSTEP, METHOD
 from lira.hal.client.arena import WiredArena
+from lira.hal.client.connect import on_bus
 from lira.hal.client.remote import RemoteArena, RemoteRobot
 from lira.hal.errors import ConfigError
 from lira.hal.messages import Episode
@@ -30,18 +28,15 @@ def arena_of(args: argparse.Namespace, robot: RemoteRobot) -> Iterator[tuple[Are
     """Reach into the twin behind a robot, or behind its devices. Raises `ConfigError` for a robot that is none."""
     if args.arena is None:
         remote = RemoteArena(robot)
-        yield remote, _world(remote.info)
+        yield remote, _needed(remote.info)
         return
-    bus = Bus(args.name, connect=args.arena)
-    try:
+    with on_bus(args.arena, args.name, close_s=CLOSE_S) as bus:
         wired = WiredArena(bus, robot)
-        yield wired, _world(wired.info)
-    finally:
-        bus.close(CLOSE_S)
+        yield wired, _needed(wired.info)
 
 
-def _world(info: bytes) -> World:
-    world = msgspec.json.decode(info, type=World | None)
+def _needed(info: bytes) -> World:
+    world = world_in(info)
     if world is None:
         raise ConfigError("only a twin has layouts to drive, and shows a teacher where the robot is", NO_TWIN)
     return world
@@ -50,32 +45,32 @@ def _world(info: bytes) -> World:
 @contextmanager
 def request_line(robot: RemoteRobot, args: argparse.Namespace) -> Iterator[RequestLine]:
     """Listen to what a person asks."""
-    watch = Bus(args.name, connect=args.connect, watch=True)
-    try:
+    with on_bus(args.connect, args.name, watch=True, close_s=CLOSE_S) as watch:
         yield RequestLine(robot.bus, watch, robot.now)
-    finally:
-        watch.close(CLOSE_S)
 
 
 @contextmanager
 def hand_of(args: argparse.Namespace) -> Iterator[Hand]:
     """Listen to whether a hand drives."""
-    watch = Bus(args.name, connect=args.connect, watch=True)
-    try:
+    with on_bus(args.connect, args.name, watch=True, close_s=CLOSE_S) as watch:
         yield Hand(watch)
-    finally:
-        watch.close(CLOSE_S)
 
 
 def restarter(robot: RemoteRobot, args: argparse.Namespace) -> Callable[[], None] | None:
     """Return what puts a twin's robot back to the start; None for a real robot."""
-    arena = RemoteArena(robot)
-    return None if world_of(robot) == FLOOR else lambda: arena.reset(Episode(args.layout))
+    arena = robot.arena
+    return None if arena is None else lambda: arena.reset(Episode(args.layout))
+
+
+def world_in(info: bytes) -> World | None:
+    """Return a twin's world, from what its arena says; None for a real robot's. Raises `BusError`."""
+    world: World | None = understood(World | None, info)
+    return world
 
 
 def world_of(robot: RemoteRobot) -> str:
     """Return the name of a twin's world; `FLOOR` for a real robot."""
-    world = msgspec.json.decode(robot.info.arena, type=World | None)
+    world = world_in(bytes(robot.info.arena))
     return FLOOR if world is None else world.name
 
 
@@ -87,8 +82,3 @@ def reports_of(robot: RemoteRobot) -> Publish:
     qos = IN_LOCKSTEP if robot.info.mode == LOCKSTEP else None
     topics = {topic.kind: robot.bus.publisher(topic, qos) for topic in (DECISION, METHOD)}
     return lambda report: topics[type(report)].put(report, robot.now())
-
-
-def say(line: str) -> None:
-    """Print a line at once."""
-    print(line, flush=True)

@@ -4,8 +4,6 @@ from collections.abc import Callable, Iterator, Sequence
 from functools import partial
 from pathlib import Path
 
-import msgspec
-
 from lira.fusion.control import ControlLoop, Step
 from lira.fusion.experts.load import load_alone
 from lira.fusion.experts.tasks import DEFAULT
@@ -15,6 +13,7 @@ from lira.fusion.methods.base import Expert, Method, Policy
 from lira.fusion.methods.context import Context, MethodSettings
 from lira.fusion.methods.presets import OwnSettings, Preset, method_named
 from lira.fusion.methods.shield import Shield, Shielded
+from lira.hal.bus.services import understood
 from lira.hal.client.remote import RemoteRobot
 from lira.hal.errors import ConfigError
 from lira.hal.messages import STOP, Command
@@ -104,6 +103,6 @@ def teach(
     plan = Plan(
         preset, layout, seed, laps, unseen, teacher, experts, more_experts, build, where, command="lira.teach(...)"
     )
-    world = msgspec.json.decode(arena.info, type=World)
+    world: World = understood(World, arena.info)
     trainer = partial(InlineTrainer, adopt_after_s=robot.profile.period_s)  # weights drive when they would on a robot
     return teach_on(robot, arena, world, plan, trainer, say)

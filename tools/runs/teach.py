@@ -16,7 +16,8 @@ from lira.sim_backend.world import World
 from lira.tools.launch.lifetime import saving
 from lira.tools.runs.build import NewTrainer, teacher
 from lira.tools.runs.course import Course, run_course
-from lira.tools.runs.folder import LABELS, RECORD, check_fresh, snapshot
+from lira.tools.runs.folder import check_fresh, snapshot
+from lira.tools.runs.names import LABELS, RECORD
 from lira.tools.runs.plan import Plan, build_traced
 from lira.tools.runs.progress import Publish, Say, telling
 

@@ -8,7 +8,7 @@ from lira.fusion.experts.tasks import task_of
 from lira.fusion.learning.labels import Label
 from lira.fusion.log.label_log import DemonstrationLog, read_demonstrations
 from lira.fusion.log.recorder import Journal
-from lira.fusion.log.run_log import UNPROVEN, ResultRecord, RunWriter
+from lira.fusion.log.run_log import UNPROVEN, RunWriter
 from lira.fusion.operator_service import OperatorService
 from lira.fusion.service import serve
 from lira.hal.client.remote import RemoteRobot
@@ -18,7 +18,8 @@ from lira.tools.live.before import days_before
 from lira.tools.operator.voice import explain
 from lira.tools.recording.beside import recorder_beside
 from lira.tools.runs.build import NewTrainer
-from lira.tools.runs.folder import LABELS, RECORD, snapshot
+from lira.tools.runs.folder import snapshot
+from lira.tools.runs.names import LABELS, RECORD
 from lira.tools.runs.plan import Plan, build_traced
 from lira.tools.runs.progress import Publish, Say
 from lira.tools.runs.reach import PAUSED, hand_of, request_line, restarter, world_of
@@ -50,7 +51,7 @@ def learn_from_person(
             journal = Journal(keep=log.append, write=record.write, publish=publish)
             if (newest := before.newest) is not None:
                 journal.ledger.go_on(newest.labels, newest.interventions, newest.calls, before.account)
-            loop = ControlLoop(robot, truth=None if robot.arena is None else robot.link.state)
+            loop = ControlLoop(robot, truth=None if robot.arena is None else robot.state)
             began_s = robot.now()
             with stop_or_interrupt() as stop, request_line(robot, args) as line, hand_of(args) as hand:
                 service = OperatorService(
@@ -82,24 +83,13 @@ def learn_from_person(
                         is_attended=lambda: hand.holds,
                         alive=notifier.alive,
                     )
-                record.write(_result(journal, service.episode, novice.training_steps, robot.now() - began_s))
+                # Nothing is proven here: that takes a session with an end.
+                result = journal.result(
+                    converged=False,
+                    laps=service.episode,
+                    training_steps=novice.training_steps,
+                    simulated_s=robot.now() - began_s,
+                    proof=UNPROVEN,
+                )
+                record.write(result)
     return 0
-
-
-def _result(journal: Journal, laps: int, training_steps: int, simulated_s: float) -> ResultRecord:
-    """What it came to. Nothing is proven here: that takes a session with an end."""
-    ledger = journal.ledger
-    return ResultRecord(
-        converged=False,
-        laps=laps,
-        human_labels=ledger.labels.stored_human,
-        demonstration=ledger.labels.demonstration,
-        interventions=ledger.interventions,
-        calls=ledger.calls,
-        buffer=ledger.buffer,
-        training_steps=training_steps,
-        simulated_s=simulated_s,
-        elapsed_s=journal.elapsed_s,
-        account=ledger.account,
-        proof=UNPROVEN,
-    )

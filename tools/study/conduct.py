@@ -10,8 +10,9 @@ from pathlib import Path
 
 from lira.hal.config import write_whole
 from lira.hal.errors import ConfigError
-from lira.tools.report import RECORD, write_report
+from lira.tools.report import write_report
 from lira.tools.report.digest import load_run
+from lira.tools.runs.names import RECORD
 from lira.tools.study import script
 from lira.tools.study.analysis import render
 from lira.tools.study.order import blinded, order

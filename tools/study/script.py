@@ -13,7 +13,7 @@ from lira.hal.messages import Phase
 from lira.hal.profile import load_profile
 from lira.sim_backend.catalogue import load_world
 from lira.tools.live.verdict import has_passed, verdict_words
-from lira.tools.runs.folder import RECORD
+from lira.tools.runs.names import RECORD
 from lira.tools.runs.plan import Plan
 from lira.tools.runs.simulated import simulate
 from lira.tools.runs.teach import teach_on

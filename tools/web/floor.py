@@ -2,16 +2,14 @@
 
 from typing import Any
 
-import msgspec
-
-from lira.hal.bus.services import Info
+from lira.hal.bus.services import Info, understood
 from lira.sim_backend.world import World
 from lira.tools.report.course import NOTHING, course
 
 
 def floor_of(info: Info, layout: int) -> dict[str, Any]:
     """Line and outlines in metres, as the page draws them."""
-    world = msgspec.json.decode(info.arena, type=World | None)
+    world: World | None = understood(World | None, bytes(info.arena))
     floor = NOTHING if world is None else course(world.name, layout)
     return {
         "world": None if world is None else world.name,

@@ -4,10 +4,9 @@ It never drives before it is asked to prove itself, so it never sees where its o
 """
 
 from lira.fusion.learning.novice import Novice
-from lira.fusion.methods.base import STAND, Choice, Method, Proposal
+from lira.fusion.methods.base import ASK, Method, Proposal
 from lira.fusion.methods.context import Context, MethodSettings
 from lira.fusion.preprocess import Features
-from lira.hal.messages import Call, Driver
 
 
 class CloningSettings(MethodSettings, frozen=True, tag="cloning"):
@@ -35,4 +34,4 @@ class Cloning(Method):
 
     def propose(self, features: Features) -> Proposal:
         """Ask the human to drive."""
-        return Proposal(features, Choice(Driver.NOBODY, STAND, call=Call.FEEDBACK), self.novice.act(features))
+        return Proposal(features, ASK, self.novice.act(features))

@@ -13,7 +13,7 @@ box to see whether it asks. A hand that came uncalled goes when it likes.
 from abc import abstractmethod
 
 from lira.fusion.learning.novice import Novice
-from lira.fusion.methods.base import STAND, Choice, Lesson, Method, Policy, Proposal
+from lira.fusion.methods.base import ASK, STAND, Choice, Lesson, Method, Policy, Proposal
 from lira.fusion.preprocess import Features
 from lira.hal.messages import Action, Call, Driver
 
@@ -48,7 +48,7 @@ class RobotGated(Method):
         """The novice's action, or to stand and call; before its first training step the human is asked to drive."""
         a_n = self.novice.act(features)
         if not self.novice.trained:
-            return Proposal(features, Choice(Driver.NOBODY, STAND, call=Call.FEEDBACK), a_n)
+            return Proposal(features, ASK, a_n)
         if not self._called and not self._human_drove and self.hands_over(features, a_n):
             self._called = True
         if self._called:

@@ -4,12 +4,12 @@ At test time the novice may doubt: `fusion/methods/doubt.py`.
 """
 
 from lira.fusion.learning.novice import Novice
-from lira.fusion.methods.base import STAND, Choice, Lesson, Method, Proposal
+from lira.fusion.methods.base import ASK, Choice, Lesson, Method, Proposal
 from lira.fusion.methods.context import Context, MethodSettings
 from lira.fusion.methods.doubt import DoubtLog, doubt_of
 from lira.fusion.methods.stop_and_ask import Doubtful
 from lira.fusion.preprocess import Features
-from lira.hal.messages import Action, Call, Driver, Phase
+from lira.hal.messages import Action, Driver, Phase
 
 
 class HgDaggerSettings(MethodSettings, frozen=True, tag="hg-dagger"):
@@ -50,7 +50,7 @@ class HgDagger(Method):
         """The novice's action; before its first training step it asks the human to drive."""
         a_n = self.novice.act(features)
         if not self.novice.trained:
-            return Proposal(features, Choice(Driver.NOBODY, STAND, call=Call.FEEDBACK), a_n)
+            return Proposal(features, ASK, a_n)
         return Proposal(features, Choice(Driver.NOVICE, a_n), a_n)
 
     def learn(self, proposal: Proposal, human: Action | None) -> Lesson:

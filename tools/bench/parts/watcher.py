@@ -7,8 +7,7 @@ import sys
 import time
 
 from lira.hal.bus.bus import Bus
-from lira.hal.bus.services import info_from_json
-from lira.hal.bus.topics import INFO
+from lira.hal.bus.services import ask_info
 from lira.tools.operator.listen import Ears
 
 READY = "watching"
@@ -18,7 +17,7 @@ LOOK_S = 0.05
 def main(name: str, endpoint: str) -> None:
     """Look for ever."""
     watch = Bus(name, connect=endpoint, watch=True)
-    ears = Ears(watch, info_from_json(watch.ask(INFO)).profile)
+    ears = Ears(watch, ask_info(watch).profile)
     print(READY, flush=True)
     while True:
         ears.look()

@@ -18,6 +18,7 @@ from lira.fusion.preprocess import Preprocessor
 from lira.hal.bus.bus import Bus
 from lira.hal.bus.publisher import Publisher
 from lira.hal.bus.topics import CMD_VEL
+from lira.hal.client.connect import open_remote
 from lira.hal.client.remote import RemoteRobot
 from lira.hal.errors import SensorError
 from lira.hal.messages import HELD, STOP, Applied, Command, Reason, Twist
@@ -111,8 +112,7 @@ def main(name: str, endpoint: str, control_port: int, journal: Path) -> None:
     bus = Bus(name, connect=endpoint)
     lies = bus.publisher(CMD_VEL)  # what goes out here is noted as a liar's; from now on all is the driver's
     note_commands(journal, "driver")
-    robot = RemoteRobot(bus)
-    robot.open()
+    robot = open_remote(bus)
     driver = Driver(robot, lies, Pen(journal, "liar"))
     listen(control_port, driver.hear)
     print(READY, flush=True)

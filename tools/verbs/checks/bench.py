@@ -14,14 +14,13 @@ exit status: 1 if something that has to stay flat did not, or a ratio is over 30
 
 import argparse
 import importlib
-import json
 import sys
 from pathlib import Path
 
 from lira.hal.errors import ConfigError
 from lira.tools.bench import BENCHES, Row, describe_machine
 from lira.tools.options import add_json, positive
-from lira.tools.output.machine import table, take_stdout, write_file
+from lira.tools.output.machine import output_for, table, tell
 
 LASTING = ("soak", "drivers", "record")  # those that go on for --minutes
 SEEDED = ("trial",)  # those that play the trials of so many --seeds
@@ -47,14 +46,12 @@ def run(args: argparse.Namespace) -> int:
         raise ConfigError(f"'{args.name}' takes no --minutes", f"Only {' and '.join(LASTING)} do.")
     if args.seeds is not None and args.name not in SEEDED:
         raise ConfigError(f"'{args.name}' takes no --seeds", f"Only {' and '.join(SEEDED)} does.")
-    output = take_stdout() if args.json == "-" else sys.stdout
+    output = output_for(args.json)
     module = importlib.import_module(f"lira.tools.bench.{args.name}")
     given = [value for value in (args.minutes, args.seeds) if value is not None]
     results: list[Row] = module.run(*given)
-    text = json.dumps({"name": args.name, "machine": describe_machine(), "results": results}, indent=2)
-    if args.json not in (None, "-"):
-        write_file(Path(args.json), text)
-    print(text if args.json == "-" else table(results), file=output, flush=True)
+    found = {"name": args.name, "machine": describe_machine(), "results": results}
+    tell(args.json, output, found, table(results))
     slower = False if args.history is None else note(args.history / f"{args.name}.jsonl", results)
     return 1 if slower or exit_status(results) else 0
 

@@ -12,8 +12,6 @@ examples:
 """
 
 import argparse
-import json
-import sys
 from pathlib import Path
 
 from lira.hal.bus.endpoint import DEFAULT_ROBOT
@@ -45,14 +43,14 @@ def run(args: argparse.Namespace) -> int:
     from lira.robot.settings import load_settings
     from lira.tools.doctor.checks import examine, worst
     from lira.tools.doctor.finding import Level, Patient
-    from lira.tools.output.machine import take_stdout, write_file
+    from lira.tools.output.machine import output_for, tell
 
     if not 0.5 <= args.seconds <= 600.0:
         raise ConfigError(f"--seconds {args.seconds} is out of range", "Give 0.5 to 600.")
     load_settings(args.settings)
     wanted = {name: getattr(args, name) for name in Patient.__dataclass_fields__ if name != "profile"}
     patient = Patient(load_profile(args.profile), **wanted)
-    output = take_stdout() if args.json == "-" else sys.stdout
+    output = output_for(args.json)
     findings = []
     for name, finding in examine(patient):
         findings.append((name, finding))
@@ -61,15 +59,10 @@ def run(args: argparse.Namespace) -> int:
             if finding.remedy:
                 print(f"{'':<8} {finding.remedy}", file=output, flush=True)
     level = worst([finding for _, finding in findings])
-    if args.json is not None:
-        rows = [
-            {"check": name, "level": each.level, "what": each.what, "remedy": each.remedy, "values": dict(each.values)}
-            for name, each in findings
-        ]
-        failed = sorted({name for name, finding in findings if finding.level is Level.FAILED})
-        text = json.dumps({"name": "doctor", "level": level, "failed": failed, "checks": rows}, indent=2)
-        if args.json == "-":
-            print(text, file=output, flush=True)
-        else:
-            write_file(Path(args.json), text)
+    rows = [
+        {"check": name, "level": each.level, "what": each.what, "remedy": each.remedy, "values": dict(each.values)}
+        for name, each in findings
+    ]
+    failed = sorted({name for name, finding in findings if finding.level is Level.FAILED})
+    tell(args.json, output, {"name": "doctor", "level": level, "failed": failed, "checks": rows})
     return 1 if level is Level.FAILED else 0

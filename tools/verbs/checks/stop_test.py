@@ -19,7 +19,6 @@ examples:
 """
 
 import argparse
-import json
 import signal
 import sys
 from collections.abc import Mapping, Sequence
@@ -52,23 +51,16 @@ def run(args: argparse.Namespace) -> int:
     """Run the matrix, or the mutants."""
     from lira.hal.profile import load_profile
     from lira.tools.bench import describe_machine
-    from lira.tools.output.machine import take_stdout, write_file
+    from lira.tools.output.machine import output_for, tell
 
     load_profile(args.profile)  # said here rather than by each process that is given it
-    output = take_stdout() if args.json == "-" else sys.stdout
+    output = output_for(args.json)
     signal.signal(signal.SIGTERM, signal.default_int_handler)  # whatever ends this ends all that it has started
     with TemporaryDirectory() as folder:
         results = try_mutants(args, Path(folder)) if args.mutants else try_rows(args, Path(folder))
     passed = all(result["caught" if args.mutants else "passed"] for result in results)
-    if args.json is not None:
-        answer = {"name": "stop-test", "passed": passed, "machine": describe_machine(), "results": results}
-        text = json.dumps(answer, indent=2)
-        if args.json == "-":
-            print(text, file=output, flush=True)
-        else:
-            write_file(Path(args.json), text)
-    if args.json != "-":
-        print(as_table(MUTANT_COLUMNS if args.mutants else COLUMNS, results), file=output)
+    found = {"name": "stop-test", "passed": passed, "machine": describe_machine(), "results": results}
+    tell(args.json, output, found, as_table(MUTANT_COLUMNS if args.mutants else COLUMNS, results))
     return 0 if passed else 1
 
 

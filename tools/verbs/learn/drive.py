@@ -51,9 +51,10 @@ def run(args: argparse.Namespace) -> int:
     """Drive until done or told to stop."""
     from lira.fusion.experts.load import check_named
     from lira.fusion.inference.threads import one_thread
-    from lira.hal.client.remote import connect
+    from lira.hal.client.connect import connect
+    from lira.tools.output.say import say
     from lira.tools.runs.alone import examine, show
-    from lira.tools.runs.reach import reports_of, say
+    from lira.tools.runs.reach import reports_of
 
     one_thread()
     check_named([args.policy], args.experts)

@@ -86,18 +86,15 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Run the trials that are missing and print the tables."""
     from lira.tools.experiments.output.summary import to_json
-    from lira.tools.output.machine import take_stdout, write_file
+    from lira.tools.output.machine import output_for, tell
 
     if args.name in (ALL, RESULTS):
         return write_results(args)
-    output = take_stdout() if args.json == "-" else None
+    output = output_for(args.json)
     summary, page = play(args, args.name)
-    if output is not None:
-        print(to_json(summary), file=output, flush=True)
-        return 0
-    if args.json is not None:
-        write_file(Path(args.json), to_json(summary))
-    show(summary, page)
+    tell(args.json, output, to_json(summary))
+    if args.json != "-":
+        show(summary, page)
     return 0
 
 

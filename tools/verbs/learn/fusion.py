@@ -92,7 +92,7 @@ def add_teaching(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Learn until done or told to stop. Exit status 1 if the novice did not drive alone as it should."""
     from lira.fusion.inference.threads import one_thread
-    from lira.hal.client.remote import connect
+    from lira.hal.client.connect import connect
     from lira.tools.cli import require
 
     plan = plan_of(args)
@@ -103,8 +103,9 @@ def run(args: argparse.Namespace) -> int:
     with connect(args.connect, args.name, close_s=CLOSE_S) as robot:
         if args.teacher == "none":
             return learn_by_hand(args, plan, robot)
+        from lira.tools.output.say import say
         from lira.tools.runs.on_twin import teach
-        from lira.tools.runs.reach import reports_of, say
+        from lira.tools.runs.reach import reports_of
 
         return teach(args, plan, robot, reports_of(robot), say)
 
@@ -112,7 +113,8 @@ def run(args: argparse.Namespace) -> int:
 def learn_by_hand(args: argparse.Namespace, plan: "Plan", robot: "RemoteRobot") -> int:
     """Learn from whoever takes control."""
     from lira.fusion.learning.trainer import ProcessTrainer
-    from lira.tools.runs.reach import reports_of, say
+    from lira.tools.output.say import say
+    from lira.tools.runs.reach import reports_of
     from lira.tools.runs.with_person import learn_from_person
 
     return learn_from_person(args, plan, robot, ProcessTrainer, reports_of(robot), say)

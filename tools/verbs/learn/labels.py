@@ -20,15 +20,16 @@ exit status: 0 if it was done; check: 1 if something cannot be read (and was not
 """
 
 import argparse
-import json
+import sys
 from collections.abc import Callable
+from functools import partial
 from itertools import islice
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from lira.hal.errors import ConfigError
 from lira.tools.options import add_json
-from lira.tools.runs.names import LABELS
+from lira.tools.runs.names import LABELS, in_run
 
 if TYPE_CHECKING:
     from lira.fusion.log.label_salvage import Survey
@@ -41,7 +42,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
     add = parser.add_argument
     add("what", choices=tuple(DOES), help="what to do")
-    add("file", type=_log_of, nargs="+", metavar="FILE", help="the log, or its run's folder; for merge two of them")
+    log = partial(in_run, name=LABELS)
+    add("file", type=log, nargs="+", metavar="FILE", help="the log, or its run's folder; for merge two of them")
     add("--number", type=numbers, nargs="+", default=(), metavar="N", help="labels by number, like 12 or 40-43")
     add("--source", help="undo, redo: labels of the human, or of an expert by name")
     add("--from", type=float, dest="from_s", metavar="S", help="undo, redo: from this time of the robot's clock on")
@@ -54,12 +56,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     add("--profile", help="check: whose labels they are, if the file does not say (default: the known robots)")
     add_json(parser)
-
-
-def _log_of(name: str) -> Path:
-    """The log of labels: the file itself, or that in a run's folder."""
-    path = Path(name)
-    return path / LABELS if path.is_dir() else path
 
 
 def run(args: argparse.Namespace) -> int:
@@ -192,12 +188,9 @@ def wanted_of(args: argparse.Namespace) -> "Wanted":
 
 def tell(args: argparse.Namespace, found: dict[str, Any], said: str) -> int:
     """Write JSON where it is wanted, and say the same in words unless JSON goes where they would."""
-    from lira.tools.output.machine import write_file
+    from lira.tools.output import machine
 
-    text = json.dumps(found, indent=2)
-    if args.json not in (None, "-"):
-        write_file(Path(args.json), text)
-    print(text if args.json == "-" else said, flush=True)
+    machine.tell(args.json, sys.stdout, found, said)
     return 0
 
 

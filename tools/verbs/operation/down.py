@@ -21,8 +21,9 @@ def run(args: argparse.Namespace) -> int:
     """Stop it."""
     from lira.tools.lifecycle.control import take_down
     from lira.tools.lifecycle.folder import meant
+    from lira.tools.output.say import say
 
     name = meant(args.name)
-    was_up = take_down(name, lambda words: print(words, flush=True))
+    was_up = take_down(name, say)
     print(f"'{name}' is down" if was_up else f"nothing was up for '{name}'")
     return 0

@@ -22,6 +22,7 @@ import argparse
 import time
 
 from lira.tools.lifecycle.arguments import add_setup
+from lira.tools.output.say import say
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -56,8 +57,3 @@ def run(args: argparse.Namespace) -> int:
     page = f"; {does} at http://127.0.0.1:{setup.page_port}" if "page" in setup.processes else ""
     say(f"up: {setup.where}{page}")
     return 0
-
-
-def say(words: str) -> None:
-    """Print a line at once."""
-    print(words, flush=True)

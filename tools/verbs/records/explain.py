@@ -13,8 +13,6 @@ examples:
 """
 
 import argparse
-import json
-import sys
 import time
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -50,19 +48,17 @@ def run(args: argparse.Namespace) -> int:
     """Find the moment and explain it."""
     from lira.tools.inquiry.pictures import write_pictures
     from lira.tools.inquiry.why import plain, words
-    from lira.tools.output.machine import take_stdout, write_file
+    from lira.tools.output.machine import output_for, tell
 
     if args.file is None and (args.at is not None or args.last_call or args.last_stop or args.labels):
         raise ConfigError("times and labels are those of a recording", "Name its file, or ask for now with neither.")
-    output = take_stdout() if args.json == "-" else sys.stdout
+    output = output_for(args.json)
     moment = now(args) if args.file is None else then(args)
     files = [] if args.out is None else write_pictures(moment, args.out)
-    text = json.dumps({**plain(moment), "files": [str(path) for path in files]}, indent=2)
-    if args.json not in (None, "-"):
-        write_file(Path(args.json), text)
+    found = {**plain(moment), "files": [str(path) for path in files]}
     lines = [*words(moment), *(behind(args, moment) if args.labels else [])]
     lines = [*lines, *([f"written: {', '.join(map(str, files))}"] if files else [])]
-    print(text if args.json == "-" else "\n".join(lines), file=output, flush=True)
+    tell(args.json, output, found, "\n".join(lines))
     return 0
 
 
@@ -94,18 +90,14 @@ def behind(args: argparse.Namespace, moment: "Moment") -> list[str]:
 
 def now(args: argparse.Namespace) -> "Moment":
     """The moment at hand."""
-    from lira.hal.bus.bus import Bus
-    from lira.hal.bus.services import info_from_json
-    from lira.hal.bus.topics import INFO
+    from lira.hal.bus.services import ask_info
+    from lira.hal.client.connect import on_bus
     from lira.tools.cli import version
     from lira.tools.inquiry.moment import moment_now
     from lira.tools.launch.lifetime import CLOSE_S
     from lira.tools.recording.layout import Head
 
-    bus = Bus(args.name, connect=args.connect, watch=True)
-    try:
-        info = info_from_json(bus.ask(INFO))
+    with on_bus(args.connect, args.name, watch=True, close_s=CLOSE_S) as bus:
+        info = ask_info(bus)
         began_ns = time.time_ns()
         return moment_now(bus, Head(bus.robot, version(), 0, began_ns, info), HEARD_S)
-    finally:
-        bus.close(CLOSE_S)

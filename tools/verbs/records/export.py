@@ -63,9 +63,9 @@ def write_network(args: argparse.Namespace) -> int:
     """Read a novice or an expert, and write it."""
     from lira.fusion.inference.checkpoint import load_checkpoint
     from lira.tools.export.onnx_file import write_onnx
-    from lira.tools.runs.names import NOVICE
+    from lira.tools.runs.names import NOVICE, in_run
 
-    network, checkpoint = load_checkpoint(args.file / NOVICE if args.file.is_dir() else args.file)
+    network, checkpoint = load_checkpoint(in_run(args.file, NOVICE))
     write_onnx(network, checkpoint, args.out)
     kind = {"fusion": "a novice", "kernel": "a kernel novice"}.get(checkpoint.kind, f"a {checkpoint.kind} expert")
     print(f"written: {args.out}: {kind} of '{checkpoint.profile}' that sees {' and '.join(checkpoint.features)}")

@@ -12,8 +12,6 @@ exit status: 0, 1 if the recorder lost something or a file was cut off, 2 if the
 """
 
 import argparse
-import json
-import sys
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -32,16 +30,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Read it all and say what there is."""
-    from lira.tools.output.machine import take_stdout, write_file
+    from lira.tools.output.machine import output_for, tell
     from lira.tools.recording.reader import Recording
     from lira.tools.recording.summary import summarise
 
-    output = take_stdout() if args.json == "-" else sys.stdout
+    output = output_for(args.json)
     summary = summarise(Recording(args.file))
-    text = json.dumps(plain(summary), indent=2)
-    if args.json not in (None, "-"):
-        write_file(Path(args.json), text)
-    print(text if args.json == "-" else words(summary), file=output, flush=True)
+    tell(args.json, output, plain(summary), words(summary))
     return 1 if summary.torn or summary.lost else 0
 
 

@@ -65,8 +65,8 @@ def run(args: argparse.Namespace) -> int:
 def tell(args: argparse.Namespace, recording: "Recording", stop: threading.Event) -> None:
     """Tell all that was told."""
     from lira.hal.bus.bus import Bus
+    from lira.tools.output.say import say
     from lira.tools.recording.player import Player
-    from lira.tools.runs.reach import say
 
     def ask(each: "Recorded") -> bool:
         decision = each.message
@@ -104,8 +104,8 @@ def be_robot(args: argparse.Namespace, recording: "Recording", stop: threading.E
 
     from lira.hal.bus.topics import SIM_STATE
     from lira.hal.server.serve import serve
+    from lira.tools.output.say import say
     from lira.tools.recording.recorded_robot import RecordedRobot
-    from lira.tools.runs.reach import say
 
     robot = RecordedRobot(recording, time.monotonic, speed=args.speed)
     knows_truth = next(recording.messages(SIM_STATE), None) is not None

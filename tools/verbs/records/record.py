@@ -43,7 +43,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Record until told to stop."""
     from lira.hal.server.server import stop_on_signal
-    from lira.tools.runs.reach import say
+    from lira.tools.output.say import say
 
     if args.recover is not None:
         from lira.tools.recording.recover import recover
@@ -57,21 +57,20 @@ def run(args: argparse.Namespace) -> int:
 
 def record(args: argparse.Namespace, stop: "Event") -> int:
     """Record until `stop` is set, or the disk takes no more."""
-    from lira.hal.bus.bus import Bus
+    from lira.hal.client.connect import on_bus
     from lira.tools.cli import version
     from lira.tools.launch.lifetime import CLOSE_S
     from lira.tools.launch.notify import Notifier
     from lira.tools.output.places import check_folder
+    from lira.tools.output.say import say
     from lira.tools.recording.beside import READY, new_folder
     from lira.tools.recording.recorder import Recorder, listen
     from lira.tools.recording.writer import RecordingWriter
-    from lira.tools.runs.reach import say
 
     folder = new_folder(args.run) if args.run else args.out or Path("recordings") / f"{datetime.now():%Y%m%d-%H%M%S}"
     check_folder(folder)
     notifier = Notifier.from_environment()
-    bus = Bus(args.name, connect=args.connect, watch=True)
-    try:
+    with on_bus(args.connect, args.name, watch=True, close_s=CLOSE_S) as bus:
         head, tap, heard = listen(bus, version(), shlex.join(["lira", *sys.argv[1:]]), stop)
         writer = RecordingWriter(folder, head, split_bytes=args.split * 2**20)
         os.nice(NICENESS)
@@ -80,8 +79,6 @@ def record(args: argparse.Namespace, stop: "Event") -> int:
         say(words)
         notifier.ready(words)
         recorder.run(stop, heard, notifier.alive)
-    finally:
-        bus.close(CLOSE_S)
     lost = recorder.lost.total()
     say(f"recorded {recorder.count} messages, {writer.size_bytes / 1e6:.1f} MB, lost {lost}: {folder}")
     return 0

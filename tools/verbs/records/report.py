@@ -19,7 +19,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Write the page and print its path."""
-    from lira.tools.report import COMPARISON, RECORD, write_comparison, write_report
+    from lira.tools.report import COMPARISON, write_comparison, write_report
+    from lira.tools.runs.names import RECORD
 
     folders = [path.parent if path.name == RECORD else path for path in args.run]
     match folders:

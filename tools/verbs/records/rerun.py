@@ -14,8 +14,6 @@ exit status: 0, 1 if the same method did not do the same, 2 if it cannot be gone
 """
 
 import argparse
-import json
-import sys
 import time
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -48,10 +46,10 @@ def run(args: argparse.Namespace) -> int:
     from lira.tools.inquiry.rerun import go_again
     from lira.tools.inquiry.settings import changed
     from lira.tools.inquiry.trace import read_traces
-    from lira.tools.output.machine import take_stdout, write_file
+    from lira.tools.output.machine import output_for, tell
     from lira.tools.recording.reader import Recording
 
-    output = take_stdout() if args.json == "-" else sys.stdout
+    output = output_for(args.json)
     recording = Recording(args.file)
     found: list[dict[str, Any]] = []
     lines: list[str] = []
@@ -71,10 +69,7 @@ def run(args: argparse.Namespace) -> int:
             lines += table(otherwise, trace.recipe.preset.name, name_of(args))
             if args.page is not None:
                 lines.append(f"page: {write_page(args.page, otherwise, trace, name_of(args))}")
-    text = json.dumps(found, indent=2)
-    if args.json not in (None, "-"):
-        write_file(Path(args.json), text)
-    print(text if args.json == "-" else "\n".join(lines), file=output, flush=True)
+    tell(args.json, output, found, "\n".join(lines))
     return 0 if identical else 1
 
 

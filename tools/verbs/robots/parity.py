@@ -71,15 +71,12 @@ def address(word: str) -> tuple[str, str]:
 
 def over_bus(name: str, endpoint: str, shown: str = "") -> "Recording":
     """Drive a robot that is on the bus through the script."""
-    from lira.hal.bus.bus import Bus
+    from lira.hal.client.connect import on_bus
     from lira.tools.parity.record import record
 
     print(f"{shown or f'{name}@{endpoint}'}: ...", file=sys.stderr, flush=True)
-    bus = Bus(name, connect=endpoint)
-    try:
+    with on_bus(endpoint, name, close_s=CLOSE_S) as bus:
         return record(bus, shown or f"{name}@{endpoint}")
-    finally:
-        bus.close(CLOSE_S)
 
 
 def own(args: argparse.Namespace) -> "tuple[Recording, Recording]":
@@ -128,26 +125,20 @@ def show(args: argparse.Namespace, first: "Recording", second: "Recording", rows
     """Print the table, or write it as JSON and as a page."""
     import msgspec
 
-    from lira.tools.output.machine import take_stdout, write_file
+    from lira.tools.output.machine import output_for, tell, write_file
     from lira.tools.output.table import format_table
     from lira.tools.parity.compare import cells
     from lira.tools.parity.page import COLUMNS, render
 
-    output = take_stdout() if args.json == "-" else sys.stdout
+    output = output_for(args.json)
     if args.out is not None:
         try:
             args.out.mkdir(parents=True, exist_ok=True)
         except OSError as error:
             raise StorageError(f"cannot write {args.out}: {error.strerror}", "Choose another folder.") from error
         write_file(args.out / PAGE, render(first, second, rows))
-    if args.json is not None:
-        robots = [{"name": each.name, "profile": each.profile.name} for each in (first, second)]
-        text = msgspec.json.format(msgspec.json.encode({"robots": robots, "rows": rows}), indent=2).decode()
-        if args.json == "-":
-            print(text, file=output, flush=True)
-            return
-        write_file(Path(args.json), text)
+    robots = [{"name": each.name, "profile": each.profile.name} for each in (first, second)]
+    text = msgspec.json.format(msgspec.json.encode({"robots": robots, "rows": rows}), indent=2).decode()
     columns = ("", "unit", first.name, second.name, *COLUMNS[4:])
-    print(format_table(columns, [cells(row) for row in rows]), file=output)
-    if args.out is not None:
-        print(f"\nplots: {args.out / PAGE}", file=output)
+    plots = "" if args.out is None else f"\n\nplots: {args.out / PAGE}"
+    tell(args.json, output, text, format_table(columns, [cells(row) for row in rows]) + plots)

@@ -19,6 +19,7 @@ from pathlib import Path
 
 from lira.hal.errors import ConfigError, DeviceError
 from lira.tools.options import add_client
+from lira.tools.output.say import say
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -79,8 +80,3 @@ def doing(pad: str, args: argparse.Namespace) -> str:
     """What the bridge does with its pad, "" if there is none."""
     what = f"drives '{args.name}' at {args.connect}"
     return f"joystick {what} with {pad}" if pad else f"joystick waits for a pad, and then {what}"
-
-
-def say(words: str) -> None:
-    """Print a line at once."""
-    print(words, flush=True)

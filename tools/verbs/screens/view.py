@@ -78,7 +78,7 @@ def run(args: argparse.Namespace) -> int:
 def _source(args: argparse.Namespace, stack: contextlib.ExitStack) -> "tuple[str, Source, Boundary]":
     """The robot's name, what is looked at, and what counts what was not taken."""
     from lira.hal.bus.boundary import Boundary
-    from lira.hal.bus.bus import Bus
+    from lira.hal.client.connect import on_bus
     from lira.tools.launch.lifetime import CLOSE_S
     from lira.tools.view.source import LiveSource, PlayedSource
 
@@ -92,8 +92,7 @@ def _source(args: argparse.Namespace, stack: contextlib.ExitStack) -> "tuple[str
             PlayedSource(samples, (0.0 if into_file else 1.0) if args.speed is None else args.speed),
             Boundary(),
         )
-    watch = Bus(args.name, connect=args.connect, watch=True)
-    stack.callback(watch.close, CLOSE_S)
+    watch = stack.enter_context(on_bus(args.connect, args.name, watch=True, close_s=CLOSE_S))
     return args.name, LiveSource(watch), watch.boundary
 
 

@@ -30,6 +30,7 @@ from typing import TYPE_CHECKING
 from lira.hal.errors import ConfigError
 from lira.hal.messages import Phase
 from lira.tools.options import add_expert, add_layout, add_protocol, add_randomise, add_record, add_seed, natural
+from lira.tools.output.say import say
 
 if TYPE_CHECKING:
     from lira.tools.launch.launch import Part
@@ -121,7 +122,7 @@ def supervise(parts: Sequence["Part"], fusion_command: list[str], folder: Path) 
     Raises `ProcessError` when one of them dies.
     """
     from lira.tools.output.places import check_folder
-    from lira.tools.report import RECORD
+    from lira.tools.runs.names import RECORD
 
     check_folder(folder)
     if (folder / RECORD).exists():
@@ -141,7 +142,7 @@ def watch(parts: Sequence["Part"], fusion_command: list[str], folder: Path) -> N
     from lira.tools.launch.processes import ChildProcess
 
     with (
-        running(parts, folder, lambda line: print(line, flush=True)) as robot,
+        running(parts, folder, say) as robot,
         ChildProcess("the learner", fusion_command, folder / "lira.fusion.log") as learner,
     ):
         follow(robot, learner, folder)
@@ -150,7 +151,7 @@ def watch(parts: Sequence["Part"], fusion_command: list[str], folder: Path) -> N
 def follow(robot: Sequence["ChildProcess"], learner: "ChildProcess", folder: Path) -> None:
     """Show how the run gets on until the learner ends. Raises `ProcessError` if anything dies, or nothing happens."""
     from lira.tools.launch.processes import ProcessError
-    from lira.tools.report import RECORD
+    from lira.tools.runs.names import RECORD
     from lira.tools.runs.progress import Display, Progress, Tail
 
     display, progress, tail = Display(sys.stdout), Progress(), Tail(folder / RECORD)
@@ -190,9 +191,10 @@ def conclude(folder: Path) -> int:
     from lira.tools.output.label_words import learned_words
     from lira.tools.output.proven import contradiction_words, proof_words, unseen_words
     from lira.tools.output.table import format_table
-    from lira.tools.report import RECORD, write_report
+    from lira.tools.report import write_report
     from lira.tools.report.digest import load_run
     from lira.tools.report.laps import COLUMNS, lap_cells
+    from lira.tools.runs.names import RECORD
 
     run = load_run(folder / RECORD)
     print(f"\n{format_table(COLUMNS, [lap_cells(lap) for lap in run.laps])}\n")

@@ -35,7 +35,7 @@ def run(args: argparse.Namespace) -> int:
     """Hold blocks, or analyse them."""
     from lira.fusion.inference.threads import one_thread
     from lira.tools.cli import main
-    from lira.tools.runs.reach import say
+    from lira.tools.output.say import say
     from lira.tools.study.conduct import Study
     from lira.tools.study.plan import load_plan
 

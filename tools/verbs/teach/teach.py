@@ -91,12 +91,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Hold the session, and leave a report."""
     from lira.fusion.inference.threads import one_thread
-    from lira.hal.client.remote import connect
+    from lira.hal.client.connect import connect
     from lira.tools.cli import require
     from lira.tools.launch.lifetime import CLOSE_S
     from lira.tools.live.rules import Rules
     from lira.tools.live.sitting import sit
-    from lira.tools.runs.reach import say
+    from lira.tools.output.say import say
 
     scripted = args.person != "hand"
     args.run = args.run or Path("runs") / f"teach-{args.who}-{datetime.now():%Y%m%d-%H%M%S}"
@@ -149,7 +149,7 @@ def robot_of(args: argparse.Namespace) -> Iterator[None]:
     """The robot that is there, or a twin for as long as the session lasts. Sets `args.connect`, for a script a name."""
     from lira.tools.launch.launch import direct, running, twin_words
     from lira.tools.launch.processes import free_port
-    from lira.tools.runs.reach import say
+    from lira.tools.output.say import say
 
     if args.connect is not None:
         yield
@@ -181,9 +181,10 @@ def conclude(folder: Path, passed: bool | None, shown_as: str) -> int:
     """Write the report, and say where it is and what to do with it."""
     from lira.tools.output.label_words import learned_words
     from lira.tools.output.table import format_table
-    from lira.tools.report import RECORD, write_report
+    from lira.tools.report import write_report
     from lira.tools.report.digest import load_run
     from lira.tools.report.laps import COLUMNS, lap_cells
+    from lira.tools.runs.names import RECORD
 
     recorded = load_run(folder / RECORD)
     print(f"\n{format_table(COLUMNS, [lap_cells(lap) for lap in recorded.laps])}\n")
