@@ -4,6 +4,7 @@ import math
 import threading
 from collections.abc import Callable
 
+import msgspec
 import numpy as np
 
 from lira.hal.bus.sensors import Stamped, observation_of
@@ -27,6 +28,13 @@ from lira.hal.messages import (
 from lira.hal.profile import Lidar, RobotProfile
 
 GRAY = 128
+SMALL_PX = (64, 48)
+
+
+def small_pictures(profile: RobotProfile) -> RobotProfile:
+    """Return the profile with a small camera: where nobody looks at the pictures, they need not take time."""
+    camera = msgspec.structs.replace(profile.camera, width_px=SMALL_PX[0], height_px=SMALL_PX[1])
+    return msgspec.structs.replace(profile, camera=camera)
 
 
 class NullRobot:

@@ -8,6 +8,7 @@ In CI (`CI=true`) a skipped test fails unless its reason is expected: a suite th
 Property tests try the same examples in every run; `pytest --hypothesis-profile=explore` looks for new ones.
 """
 
+import gc
 import os
 import signal
 import sys
@@ -51,7 +52,8 @@ def pytest_addoption(parser: pytest.Parser) -> None:
 
 
 def pytest_configure(config: pytest.Config) -> None:
-    """Keep a worker to itself."""
+    """Keep a worker to itself. What it imports and collects stays: to look there for garbage takes a second or more."""
+    gc.disable()
     if hasattr(config, "workerinput") and sys.platform == "linux":
         take_own_loopback()
 
@@ -70,14 +72,24 @@ def pytest_ignore_collect(collection_path: Path, config: pytest.Config) -> bool 
 
 
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
-    """Mark every test by its kind (`kinds.py`), and choose those of this half of the run."""
+    """Mark every test by its kind (`kinds.py`), and choose those of this half of the run.
+
+    A crowd begins with the files that mostly wait, the slowest first: what is left in the end is short.
+    """
     for item in items:
         item.add_marker(kind_of(item.path))
     if config.getoption("crowd"):
         items[:] = [item for item in items if item.get_closest_marker("alone") is None]
+        items.sort(key=lambda item: (item.get_closest_marker("slow") is None, kind_of(item.path) != "processes"))
     elif config.getoption("alone"):
         left_open = config.cache.get(OPEN, [])
         items[:] = [item for item in items if item.get_closest_marker("alone") or item.nodeid in left_open]
+
+
+def pytest_collection_finish() -> None:
+    """Collect the garbage of tests, and of nothing before them."""
+    gc.freeze()
+    gc.enable()
 
 
 def pytest_runtest_logreport(report: pytest.TestReport) -> None:

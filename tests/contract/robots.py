@@ -39,9 +39,10 @@ from lira.tools.recording.reader import Recording
 from lira.tools.recording.recorded_robot import RecordedRobot
 from lira.tools.recording.writer import RecordingWriter
 
-ROSBOT = load_profile("rosbot2")
-PROFILE = msgspec.structs.replace(  # with every sensor that there is
-    load_profile("thesis-sim"),
+ROSBOT, SIM = load_profile("rosbot2"), load_profile("thesis-sim")
+PROFILE = msgspec.structs.replace(  # with every sensor that there is, and in short steps
+    SIM,
+    control=msgspec.structs.replace(SIM.control, rate_hz=20.0),
     depth=Depth(width_px=16, height_px=12, range_min_m=0.1, range_max_m=4.0),
     imu=ROSBOT.imu,
     battery=ROSBOT.battery,

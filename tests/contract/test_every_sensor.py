@@ -58,9 +58,14 @@ def drive_until_complete(rig: Rig) -> tuple[Observation, dict[str, list]]:
     for _ in range(STEPS):
         step(rig, STOP)
         seen = rig.robot.read()
-        if all(sensor.value(seen) is not None and measured[sensor.name] for sensor in wanted):
+        if all(sent_as(sensor.value(seen), measured[sensor.name], rig) for sensor in wanted):
             break
     return seen, measured
+
+
+def sent_as(got, measured: list, rig: Rig) -> list:
+    """What was measured at the time of what arrived."""
+    return [each for each in measured if got and abs(each.stamp_s + rig.ahead_s - got.stamp_s) < rig.stamps_s]
 
 
 def test_every_sensor_of_the_robot_arrives_as_it_was_measured(rig):
@@ -68,7 +73,7 @@ def test_every_sensor_of_the_robot_arrives_as_it_was_measured(rig):
     for sensor in sensors_of(rig.robot.profile):
         got = sensor.value(seen)
         assert got is not None, f"{sensor.name} never arrives"
-        sent = [each for each in measured[sensor.name] if abs(each.stamp_s + rig.ahead_s - got.stamp_s) < rig.stamps_s]
+        sent = sent_as(got, measured[sensor.name], rig)
         assert any(alike(each, got) for each in sent), f"{sensor.name}: {got}"
     has = {sensor.name for sensor in SENSORS if sensor.value(seen) is not None}
     assert has == {sensor.name for sensor in sensors_of(rig.robot.profile)}

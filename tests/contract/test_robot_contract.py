@@ -9,7 +9,7 @@ from lira.hal.errors import LiraError
 from lira.hal.messages import STOP, Applied, Command, Episode, Reason, Source, Twist, is_neutral
 from lira.hal.port import Arena, Robot
 
-STEPS = 15  # more than any robot needs to do as told, over any bus
+STEPS = 60  # more than any robot needs to do as told, over any bus
 
 
 @pytest.fixture(params=ROBOTS)
@@ -112,7 +112,7 @@ def test_it_drives_as_told_and_says_so(rig):
     x_m = rig.arena.state().x_m
     applied = steps_until(rig, go(rig), same(go(rig)))
     assert (applied.source, applied.reason, applied.clamps) == (Source.POLICY, Reason.OK, ())
-    for _ in range(5):
+    for _ in range(15):
         step(rig, go(rig))
     assert rig.arena.state().x_m > x_m + 0.2
     assert rig.robot.read().odom.linear_m_s > 0.0

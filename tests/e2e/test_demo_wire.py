@@ -15,7 +15,7 @@ def demo(tmp_path_factory):
     folder = tmp_path_factory.mktemp("demo")
     (folder / "few.toml").write_text(FEW_METRES)
     words = ["demo", "--wire", "--world", str(folder / "few.toml"), "--laps", "1", "--unseen", "0"]
-    words += ["--method", "hold", "--layouts", "own", "--proof", "own", "--no-record"]
+    words += ["--method", "plus", "--layouts", "own", "--proof", "own", "--no-record"]
     run = folder / "run"
     with ChildProcess("demo", lira_command(*words, "--run", str(run)), folder / "demo.log") as child:
         status = child.wait(DEMO_S)

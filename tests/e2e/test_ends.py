@@ -161,10 +161,6 @@ def bench_latency(stage):
     return warmed(stage.start("bench", "bench", "latency"))
 
 
-def bench_soak(stage):
-    return warmed(stage.start("bench", "bench", "soak"))
-
-
 def parity(stage):
     return warmed(stage.start("parity", "parity", "--profile", "thesis-sim", ready="twin: ..."))
 
@@ -190,11 +186,11 @@ def wait_for(condition, process):
 
 
 ALONE = [demo, wired_demo, twin, twin_in_lockstep, wired_twin, robot, calibrate, taught, training, experiment,
-         experiment_in_processes, bench_latency, bench_soak, parity, stop_test, ros2]  # fmt: skip
+         experiment_in_processes, bench_latency, parity, stop_test, ros2]  # fmt: skip
 
 
-# Every verb by one of the signals; by both what serves, and what starts others.
-BY_BOTH = (twin, demo)
+# Every verb by one of the signals; by both what serves. What starts others are two demos.
+BY_BOTH = (twin,)
 ENDED = [
     (verb, number) for k, verb in enumerate(ALONE) for number in (SIGNALS if verb in BY_BOTH else [SIGNALS[k % 2]])
 ]

@@ -112,33 +112,6 @@ def test_the_process_gives_way_and_is_deaf_to_ctrl_c(real_time):
     assert signal.SIGINT not in signal.pthread_sigmask(signal.SIG_BLOCK, ())
 
 
-CTRL_C = """
-import os, signal, threading
-from lira.fusion.learning.learner import Learner
-from lira.fusion.policies.networks import ExpertNet
-from lira.fusion.learning.trainer import ProcessTrainer
-
-signal.signal(signal.SIGINT, lambda *_: None)
-ready = threading.Event()
-
-def press():
-    while not ready.wait(0.05):
-        os.killpg(0, signal.SIGINT)
-
-threading.Thread(target=press).start()
-try:
-    ProcessTrainer(Learner(ExpertNet("scan", (8,)), seed=0, frozen_trunks=False)).close()
-finally:
-    ready.set()
-"""
-
-
-def test_ctrl_c_while_the_process_starts_does_not_reach_it():
-    words = [sys.executable, "-c", CTRL_C]
-    done = subprocess.run(words, capture_output=True, text=True, timeout=WAIT_S, check=False, start_new_session=True)
-    assert (done.returncode, done.stderr) == (0, "")
-
-
 @pytest.mark.parametrize("adopt_after_s", [None, 0.4])
 def test_a_trainer_that_dies_is_reported_at_the_next_poll(adopt_after_s):
     trainer = process_trainer(adopt_after_s=adopt_after_s)
@@ -168,11 +141,21 @@ def test_closing_in_the_middle_of_a_long_training_step_is_bounded():
 
 
 OWNER = """
-import time
+import os, signal, threading, time
 from lira.fusion.learning.learner import Learner
 from lira.fusion.policies.networks import ExpertNet
 from lira.fusion.learning.trainer import ProcessTrainer
+
+signal.signal(signal.SIGINT, lambda *_: None)
+ready = threading.Event()
+
+def press():
+    while not ready.wait(0.05):
+        os.killpg(0, signal.SIGINT)
+
+threading.Thread(target=press).start()
 trainer = ProcessTrainer(Learner(ExpertNet("scan", (101,)), seed=0, frozen_trunks=False))
+ready.set()
 print(trainer.pid, flush=True)
 time.sleep(600)
 """
@@ -186,12 +169,13 @@ def is_running(pid: int) -> bool:
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="looks into /proc")
-def test_the_process_goes_when_its_parent_is_killed():
-    owner = subprocess.Popen([sys.executable, "-c", OWNER], stdout=subprocess.PIPE, text=True)
+def test_the_process_does_not_hear_ctrl_c_while_it_starts_and_goes_when_its_parent_is_killed():
+    words, pipe = [sys.executable, "-c", OWNER], subprocess.PIPE
+    owner = subprocess.Popen(words, stdout=pipe, stderr=pipe, text=True, start_new_session=True)
     pid = int(owner.stdout.readline())
     assert is_running(pid)
     owner.kill()
-    owner.communicate()
+    assert owner.communicate(timeout=WAIT_S)[1] == ""
     deadline = time.monotonic() + WAIT_S
     while is_running(pid) and time.monotonic() < deadline:
         time.sleep(0.05)

@@ -13,6 +13,7 @@ from lira.fusion.preprocess import Preprocessor
 from lira.hal.messages import STOP, Command, Episode
 from lira.hal.profile import load_profile
 from lira.hal.safety.governed import govern
+from lira.hal.testing import small_pictures
 from lira.sim_backend.camera import PinholeCamera
 from lira.sim_backend.foresight import Foresight, with_small_camera
 from lira.sim_backend.lidar import RayLidar
@@ -46,7 +47,7 @@ def test_a_camera_that_is_small_already_is_left_alone():
     [(0.0, 0.0, 0.0), (0.0, 0.1, 0.0), (0.18, 0.0, 0.0), (0.5, 0.0, 0.0), (0.0, 0.0, 45.0), (0.24, 0.0, 30.0)],
 )
 def test_the_protective_field_works_in_what_is_foreseen_as_on_the_robot(aside_m, turn, box_deg):
-    profile, steps = load_profile("rosbot2"), 16
+    profile, steps = small_pictures(load_profile("rosbot2")), 16
     world = World(
         description="a box on the way",
         box=(Box(x_m=1.0, y_m=0.0, yaw_deg=box_deg, length_m=0.3, width_m=0.3),),

@@ -20,7 +20,7 @@ from lira.sim_backend.scenes.sketch import SketchScene
 from lira.sim_backend.world import Box, Limits, World
 
 PROFILES = {name: load_profile(name) for name in ("thesis-sim", "rosbot2")}
-POSES = {"thesis-sim": 10, "rosbot2": 2}  # of each world and layout: a large picture takes pybullet longer
+POSES = {"thesis-sim": 5, "rosbot2": 1}  # of each world and layout: a large picture takes pybullet longer
 LAYOUTS = (0, 3)
 # Of the pixels of a picture, as it is drawn, before it is averaged down.
 MOST_PIXELS_APART = 0.001

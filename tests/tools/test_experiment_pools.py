@@ -37,6 +37,8 @@ def nothing(trials):
 @contextmanager
 def cluster(*, workers, threads=1):
     """A scheduler and its workers as separate processes; yields the address."""
+    from distributed import Client
+
     address = f"tcp://127.0.0.1:{free_port()}"
     dask = [sys.executable, "-m", "dask"]
     quiet = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL}
@@ -46,9 +48,10 @@ def cluster(*, workers, threads=1):
     try:
         wait_for(lambda: answers(address))
         if workers:
-            sizes = ["--nworkers", str(workers), "--nthreads", str(threads)]
+            sizes = ["--nworkers", str(workers), "--nthreads", str(threads), "--no-nanny"]
             processes.append(subprocess.Popen([*dask, "worker", address, *plain, *sizes], cwd=where, **quiet))
-            wait_for(lambda: count_workers(address) == workers)
+            with Client(address, timeout=START_S) as client:
+                client.wait_for_workers(workers, timeout=START_S)
         yield address
     finally:
         for process in reversed(processes):
@@ -60,13 +63,6 @@ def cluster(*, workers, threads=1):
 def answers(address):
     with socket.socket() as probe:
         return probe.connect_ex(("127.0.0.1", int(address.rsplit(":")[-1]))) == 0
-
-
-def count_workers(address):
-    from distributed import Client
-
-    with Client(address, timeout=START_S) as client:
-        return len(client.nthreads())
 
 
 def wait_for(condition):

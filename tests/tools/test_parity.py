@@ -20,7 +20,7 @@ from lira.hal.server.server import HalServer
 from lira.sim_backend.twin import Twin
 from lira.tools import cli
 from lira.tools.launch.processes import free_port
-from lira.tools.parity import motion
+from lira.tools.parity import motion, script
 from lira.tools.parity.compare import DIFFERS, MISSING, SAME, compare
 from lira.tools.parity.page import render
 from lira.tools.parity.record import Heard, InterruptedScriptError, Recording, Span, record
@@ -249,7 +249,9 @@ def test_wrong_words_are_refused_at_once(words, complaint, capsys):
     assert len(lines) == 2
 
 
-def test_the_twin_and_its_wire_behave_alike(tmp_path, capsys):
+def test_the_twin_and_its_wire_behave_alike(tmp_path, capsys, monkeypatch):
+    for name, value in {"STAND_S": 1.5, "STEP_S": 1.2, "REST_S": 0.9, "REACH_M": 0.48}.items():
+        monkeypatch.setattr(script, name, value)  # half the time, as fast
     out = tmp_path / "out"
     settings = tmp_path / "mine.toml"
     settings.write_text("[base]\ndistance_scale = 1.2\n")

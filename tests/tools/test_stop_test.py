@@ -171,6 +171,24 @@ def test_while_it_is_broken_nobody_may_resume():
     assert verdict_of(story, resumes=True).moved_unasked
 
 
+def test_before_the_silence_a_commander_may_stand_and_drive_on_but_only_by_its_own_neutral():
+    def paused(reason, *, neutral):
+        story = Story()
+        story.drive(0.0, 1.1)
+        story.send(1.1, linear=0.0 if neutral else 0.2)
+        story.stop(1.11, reason)
+        story.drive(1.15, 1.3)
+        story.stop(1.5)
+        story.ask(2.0, 2.5)
+        return story
+
+    own = paused(Reason.OK, neutral=True)
+    assert passes(verdict_of(own, silent_s=1.3))
+    assert verdict_of(own).moved_unasked
+    assert verdict_of(paused(Reason.STALE, neutral=False), silent_s=1.3).moved_unasked
+    assert verdict_of(own, silent_s=1.14).zero_s == math.inf  # it already stood
+
+
 def test_a_robot_of_which_nobody_asked_to_move_again_has_shown_nothing():
     story = Story()
     story.drive(0.0, 1.0)

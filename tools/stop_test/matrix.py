@@ -1,5 +1,6 @@
 """The matrix: one row after the other on a robot that drives, and what became of it."""
 
+import math
 import random
 import signal
 import time
@@ -93,13 +94,15 @@ def try_row(bench: ProcessBench, row: Row, phase_s: float) -> Verdict:
     refused_before = _get_going(bench, row, phase_s)
     broken_s = time.monotonic()
     row.make(bench)
+    silent_s = -math.inf
     if row.silence:
         time.sleep(BEFORE_SILENCE_S)
+        silent_s = time.monotonic()
         bench.driver.signal(signal.SIGSTOP)
     time.sleep(row.hold_s)
     mended_s = time.monotonic()
     row.mend(bench)
-    rules = _rules(bench, row, broken_s, mended_s)
+    rules = replace(_rules(bench, row, broken_s, mended_s), silent_s=silent_s)
     if not row.resumes:
         bench.ask_for_motion()
     verdict = _watch(bench, rules)

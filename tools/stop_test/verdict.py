@@ -39,17 +39,19 @@ STOPPERS: dict[Reason, str] = {
 class Rules:
     """What may happen in a trial. Times are those of the journal; what was before `began_s` does not matter.
 
-    `drives` may move the wheels, until `broken_s` and by commands no older than `stale_s`; nobody else ever. After the
-    first zero nobody may, until `mended_s` and for ever if not `resumes`; then only after a neutral command of
-    `drives`, which has to come after `mended_s` if it `renews`. From `shut_out_s` on the commands that they send count
-    for nothing. `asks` are those whose wish to move, from `asked_from_s` on, makes the trial one. `below`: who stopped
-    it where the governor did not.
+    `drives` may move the wheels, until `broken_s` and by commands no older than `stale_s`; nobody else ever. Until
+    `silent_s` the fault is to change nothing: they may stand and drive on by a neutral command of their own, as they do
+    where the machine lets them wait for their sensors. After the first zero from then on nobody may, until `mended_s`
+    and for ever if not `resumes`; then only after a neutral command of `drives`, which has to come after `mended_s` if
+    it `renews`. From `shut_out_s` on what they send counts for nothing. `asks` are those whose wish to move,
+    from `asked_from_s` on, makes the trial one. `below`: who stopped it where the governor did not.
     """
 
     began_s: float
     broken_s: float
     mended_s: float
     end_s: float
+    silent_s: float = -math.inf
     drives: frozenset[str] = frozenset({"driver"})
     stale_s: float = 0.27
     resumes: bool = False
@@ -109,8 +111,9 @@ def judge(journal: Journal, rules: Rules) -> Verdict:
     """Judge what was noted."""
     logs = Logs({one.angular_rad_s: one for one in journal.sent if one.moving})
     moving = [one for one in journal.wheels if one.moving and one.time_s >= rules.began_s]
-    zeros = (one.time_s for one in journal.wheels if not one.moving and one.time_s >= rules.broken_s)
-    zero_at_s = next(zeros, math.inf) if _drove(journal.wheels, rules.broken_s) else math.inf
+    from_s = max(rules.broken_s, rules.silent_s)
+    zeros = (one.time_s for one in journal.wheels if not one.moving and one.time_s >= from_s)
+    zero_at_s = next(zeros, math.inf) if _drove(journal.wheels, from_s) else math.inf
     origins = [logs.origin(one) for one in moving]
     pairs = list(zip(moving, origins, strict=True))
     obeyed = [sent.time_s for one, sent in pairs if sent is not None and one.time_s <= zero_at_s]
@@ -120,17 +123,36 @@ def judge(journal: Journal, rules: Rules) -> Verdict:
         fault_to_zero_s=max(zero_at_s - rules.broken_s, 0.0),
         distance_m=_path_m([one for one in journal.truth if last_s <= one.time_s <= rules.end_s]),
         stale_obeyed=sum(one.time_s - sent.time_s > rules.stale_s for one, sent in pairs if sent is not None),
-        moved_unasked=any(not _asked_for(one, sent, zero_at_s, journal.sent, rules) for one, sent in pairs),
+        moved_unasked=any(not _asked_for(one, sent, zero_at_s, journal.sent, rules) for one, sent in pairs)
+        or _drove_on(journal, logs, rules),
         stopped_by=_stopper(journal.said, zero_at_s) or rules.below,
         asked=_asked(journal, logs, max(zero_at_s, rules.mended_s, rules.asked_from_s), rules),
         stall_s=max((one.stall_s for one in journal.stalled if one.time_s >= rules.began_s), default=0.0),
     )
 
 
-def _drove(wheels: Sequence[Wheels], broken_s: float) -> bool:
-    """Whether there was anything to stop when the fault came."""
-    before = [one for one in wheels if one.time_s < broken_s]
+def _drove(wheels: Sequence[Wheels], from_s: float) -> bool:
+    """Whether there was anything to stop by then."""
+    before = [one for one in wheels if one.time_s < from_s]
     return bool(before) and before[-1].moving
+
+
+def _drove_on(journal: Journal, logs: Logs, rules: Rules) -> bool:
+    """Whether the wheels stood before the silence, and moved again though nobody who may had said neutral."""
+    obeyed_s, stood = -math.inf, False
+    for one in journal.wheels:
+        if rules.broken_s <= one.time_s < rules.silent_s:
+            if one.moving and stood and not _neutrals(journal.sent, obeyed_s, one.time_s, rules):
+                return True
+            stood = not one.moving
+        if one.moving and (sent := logs.origin(one)) is not None:
+            obeyed_s = sent.time_s
+    return False
+
+
+def _neutrals(sends: Sequence[Sent], since_s: float, until_s: float, rules: Rules) -> bool:
+    """Whether somebody who may move the wheels has said neutral meanwhile."""
+    return any(n.who in rules.drives and not n.moving and since_s <= n.time_s <= until_s for n in sends)
 
 
 def _asked_for(one: Wheels, sent: Sent | None, zero_at_s: float, sends: Sequence[Sent], rules: Rules) -> bool:
@@ -141,9 +163,7 @@ def _asked_for(one: Wheels, sent: Sent | None, zero_at_s: float, sends: Sequence
         return True
     if not rules.resumes or one.time_s < rules.mended_s:
         return False
-    since_s = rules.mended_s if rules.renews else rules.broken_s
-    neutrals = (n for n in sends if n.who in rules.drives and not n.moving and since_s <= n.time_s <= one.time_s)
-    return next(neutrals, None) is not None
+    return _neutrals(sends, rules.mended_s if rules.renews else rules.broken_s, one.time_s, rules)
 
 
 def _asked(journal: Journal, logs: Logs, since_s: float, rules: Rules) -> int:

@@ -26,11 +26,20 @@ def fingerprint(world: str, pair: str, source: bytes = b"") -> str:
     Raises `ConfigError` if an expert is not there.
     """
     profile = load_profile(TASKS[task_of(world)].profile)
-    parts = sorted(filter(None, (code(path) for path in sources(START))))
-    parts += [msgspec.json.encode(each) for each in (load_world(world), profile)]
+    parts = [msgspec.json.encode(each) for each in (load_world(world), profile)]
     parts += [expert_path(name, profile, pair).read_bytes() for name in experts_of(profile)]
     parts += [source] if source else []
-    return hashlib.sha256(b"".join(hashlib.sha256(part).digest() for part in parts)).hexdigest()[:16]
+    return hashlib.sha256(_code() + _digests(parts)).hexdigest()[:16]
+
+
+@cache
+def _code() -> bytes:
+    """Digests of what `START` imports: to parse it all takes half a second, and no world or expert changes it."""
+    return _digests(sorted(filter(None, map(code, sources(START)))))
+
+
+def _digests(parts: list[bytes]) -> bytes:
+    return b"".join(hashlib.sha256(part).digest() for part in parts)
 
 
 def sources(start: str) -> list[Path]:

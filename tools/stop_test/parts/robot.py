@@ -13,7 +13,6 @@ import time
 from dataclasses import replace
 from pathlib import Path
 
-import msgspec
 import numpy as np
 
 from lira.hal.bus.access_log import count_refusals
@@ -24,6 +23,7 @@ from lira.hal.port import Robot
 from lira.hal.profile import RobotProfile, load_profile
 from lira.hal.safety.governed import GovernedRobot
 from lira.hal.server.server import HalServer, stop_on_signal
+from lira.hal.testing import small_pictures
 from lira.robot.ros2.robot import Interface, Ros2Robot
 from lira.robot.rosbot import Devices, Rosbot
 from lira.sim_backend.twin import Twin
@@ -34,8 +34,6 @@ READY = "serving"
 TRUTH_S = 0.01
 NAP_S = 0.01
 MAIN_HANGS_S = 2.0
-# What the pictures show does not matter here; small ones leave the processor to what is measured.
-WIDTH_PX, HEIGHT_PX = 64, 48
 
 
 class NotedTwin(Twin):
@@ -78,8 +76,9 @@ class BreakableTwin(NotedTwin):
         if self.fault == "half a scan" and isinstance(seen.scan, LaserScan):
             return replace(seen, scan=replace(seen.scan, ranges=seen.scan.ranges[: len(seen.scan.ranges) // 2]))
         if self.fault == "black image" and seen.image is not None:
-            black = Image(seen.image.stamp_s, np.zeros((HEIGHT_PX, WIDTH_PX, 3), np.uint8))
-            return replace(seen, image=compress(black, self.profile.camera.encoding))
+            camera = self.profile.camera
+            black = Image(seen.image.stamp_s, np.zeros((camera.height_px, camera.width_px, 3), np.uint8))
+            return replace(seen, image=compress(black, camera.encoding))
         return seen
 
 
@@ -126,12 +125,6 @@ class WatchedRobot(GovernedRobot):
         moving = moves(applied.twist.linear_m_s, applied.twist.angular_rad_s)
         self._journal.note(Said(time.monotonic(), applied.reason, moving))
         return applied
-
-
-def small_pictures(profile: RobotProfile) -> RobotProfile:
-    """Return the profile with a small camera."""
-    camera = msgspec.structs.replace(profile.camera, width_px=WIDTH_PX, height_px=HEIGHT_PX)
-    return msgspec.structs.replace(profile, camera=camera)
 
 
 def main(name: str, endpoint: str, profile_name: str, journal_folder: str, control_port: str, *devices: str) -> None:

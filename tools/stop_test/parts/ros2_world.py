@@ -22,9 +22,9 @@ from lira.hal.messages.codec import decode, encode
 from lira.hal.messages.compression import compress
 from lira.hal.profile import RobotProfile, load_profile
 from lira.hal.server.server import stop_on_signal
+from lira.hal.testing import small_pictures
 from lira.tools.stop_test.control import listen
 from lira.tools.stop_test.journal import JournalWriter, Truth, Wheels
-from lira.tools.stop_test.parts.robot import small_pictures
 
 READY = "a ROS 2 robot"
 TIMEOUT_S = 0.5  # of its controller, after the last command

@@ -18,12 +18,13 @@ import numpy as np
 from lira.hal.messages import Command, Episode, Twist
 from lira.hal.profile import load_profile
 from lira.hal.server.server import stop_on_signal
+from lira.hal.testing import small_pictures
 from lira.robot.core2.rosserial import ASK_TOPICS
 from lira.sim_backend.emulators.wired_twin import WiredTwin
 from lira.sim_backend.polyline import Floats
 from lira.tools.stop_test.control import listen
 from lira.tools.stop_test.journal import JournalWriter
-from lira.tools.stop_test.parts.robot import NotedTwin, keep_truth, small_pictures
+from lira.tools.stop_test.parts.robot import NotedTwin, keep_truth
 
 READY = "devices, camera at "
 NEAR_M = 0.15  # in front of the lidar: inside the protective field
