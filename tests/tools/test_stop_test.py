@@ -29,6 +29,7 @@ from lira.tools.stop_test.setups import clock_library
 from lira.tools.stop_test.starved import longest_s, waits_s
 from lira.tools.stop_test.verdict import Bounds, Rules, judge, summarize
 
+pytestmark = pytest.mark.slow
 STEP_S = 0.05
 RULES = Rules(began_s=0.5, broken_s=1.0, mended_s=2.0, end_s=3.0)
 BOUNDS = Bounds(budget_s=0.35, stoppers=frozenset({"watchdog"}))
