@@ -12,6 +12,7 @@ from lira.hal.errors import LiraError
 from lira.hal.messages import STOP, Applied, Command, LaserScan, Observation, Odometry, Reason, Twist
 from lira.hal.port import Robot
 from lira.robot.calibration import free_ahead_m, free_around_m
+from lira.robot.core2.wheels import travelled
 
 PERIOD_S = 0.05
 ARM_S = 5.0
@@ -183,9 +184,7 @@ class Way:
         if odom is None:
             return
         if before is not None:
-            turn_rad = math.remainder(odom.yaw_rad - before.yaw_rad, math.tau)
-            heading_rad = before.yaw_rad + turn_rad / 2
-            east_m, north_m = odom.x_m - before.x_m, odom.y_m - before.y_m
-            self.ahead_m += east_m * math.cos(heading_rad) + north_m * math.sin(heading_rad)
+            ahead_m, turn_rad = travelled(before, odom)
+            self.ahead_m += ahead_m
             self.turn_rad += turn_rad
         self._before = odom

@@ -76,6 +76,8 @@ def _elsewhere(drive: Drive, random: np.random.Generator) -> Drive:
 
 
 STRICT = msgspec.structs.replace(PERFECT, style="proportional")  # experts are to be good: shown without faults
+STRAIGHT_ON = msgspec.structs.replace(STRICT, margin_m=0.2, horizon_s=2.0, follow_line=False)
+ASKEW = ((0.15, 0.0), (-0.15, 0.0), (0.3, 0.1), (-0.3, -0.1), (0.0, 0.2), (0.0, -0.2))  # metres aside, and yaw
 
 
 def _line_camera(teacher: TeacherSettings, back_s: float = 8.0, back_m: float = 0.35) -> Curriculum:
@@ -91,13 +93,11 @@ def _line_camera(teacher: TeacherSettings, back_s: float = 8.0, back_m: float = 
 
 def _line_lidar() -> Curriculum:
     """Forests from sparse to dense, straight on until something is in the way (fig. E.1)."""
-    teacher = msgspec.structs.replace(STRICT, margin_m=0.2, horizon_s=2.0, follow_line=False)
-    askew = [(0.15, 0.0), (-0.15, 0.0), (0.3, 0.1), (-0.3, -0.1), (0.0, 0.2), (0.0, -0.2)]
     drives = tuple(
         Drive(Episode(layout, lateral_m=lateral, yaw_rad=yaw), 60.0, "stay")
-        for layout, (lateral, yaw) in enumerate(askew * 3)
+        for layout, (lateral, yaw) in enumerate(ASKEW * 3)
     )
-    return Curriculum("forest", teacher, drives, laps=12)
+    return Curriculum("forest", STRAIGHT_ON, drives, laps=12)
 
 
 def _passage() -> Curriculum:
@@ -152,13 +152,11 @@ def _edge(world: str, askew: Sequence[tuple[float, float]], starts: Sequence[flo
 
 def _table_top_depth() -> Curriculum:
     """Straight on until something is in the way, be it a table top or a box; put before them askew and from afar."""
-    teacher = msgspec.structs.replace(STRICT, margin_m=0.2, horizon_s=2.0, follow_line=False)
-    askew = [(0.15, 0.0), (-0.15, 0.0), (0.3, 0.1), (-0.3, -0.1), (0.0, 0.2), (0.0, -0.2)]
     drives = tuple(
         Drive(Episode(layout, start_m=start_m, lateral_m=lateral, yaw_rad=yaw), 12.0, "stay")
-        for layout, (start_m, (lateral, yaw)) in enumerate(product((1.0, 5.0), askew))
+        for layout, (start_m, (lateral, yaw)) in enumerate(product((1.0, 5.0), ASKEW))
     )
-    return Curriculum("table-top-train", teacher, drives, laps=20)
+    return Curriculum("table-top-train", STRAIGHT_ON, drives, laps=20)
 
 
 def _anew(course: Curriculum) -> Curriculum:

@@ -98,6 +98,7 @@ class LockstepRobot(RemoteRobot):
         self._closed.set()
 
     def _advance(self) -> None:
+        self._check_open()
         deadline_s = time.monotonic() + ANSWER_S
         while (newer := self._newer()) is None:
             _pause(deadline_s)

@@ -1,15 +1,18 @@
 """Pictures off the bus are looked over before a decoder gets them: few bytes can ask it for seconds and gigabytes."""
 
+from collections.abc import Iterator
+
 PNG_START = b"\x89PNG\r\n\x1a\n"
 JPEG_START = b"\xff\xd8"
 CHUNK_FRAME = 12  # length, type and checksum around what a chunk holds
 LARGEST_BYTES = 8 * 2**20  # of pixels, decoded: 1920 x 1080 in colour
 MOST_SCANS = 64  # of a progressive JPEG; each goes over all pixels once more
 
+JPEG_FRAMES = frozenset({*range(0xC0, 0xD0)} - {0xC4, 0xC8, 0xCC})  # markers of a frame header (ITU T.81, table B.1)
+JPEG_SCAN, JPEG_END = 0xDA, 0xD9
+
 _PNG_CHANNELS = {0: 1, 2: 3, 3: 3, 4: 2, 6: 4}  # by colour type; an index stands for a colour
-_JPEG_FRAMES = frozenset({*range(0xC0, 0xD0)} - {0xC4, 0xC8, 0xCC})  # markers of a frame header (ITU T.81, table B.1)
-_JPEG_BARE = frozenset({0x01, *range(0xD0, 0xD9)})  # markers without a length
-_JPEG_SCAN, _JPEG_END = 0xDA, 0xD9
+_JPEG_BARE = frozenset({0x00, 0x01, *range(0xD0, 0xD9)})  # markers without a length, and what is none
 
 
 def objection(data: bytes) -> str:
@@ -35,23 +38,31 @@ def _png_objection(data: bytes) -> str:
     return _size_objection(width, height, _PNG_CHANNELS[head[9]] * max(head[8], 8) // 8)
 
 
-def _jpeg_objection(data: bytes) -> str:
-    """The decoder skips what is no marker, so this does, too."""
+def jpeg_markers(data: bytes) -> Iterator[tuple[int, int]]:
+    """Yield the markers of a JPEG that have a length, and where each begins, up to its first scan or its end.
+
+    A decoder skips what is no marker, so this does, too.
+    """
     at = len(JPEG_START)
     while (at := data.find(b"\xff", at)) >= 0 and at + 1 < len(data):
         marker = data[at + 1]
-        if marker in _JPEG_FRAMES and at + 10 <= len(data):
+        if marker == 0xFF or marker in _JPEG_BARE:
+            at += 1 if marker == 0xFF else 2
+            continue
+        yield marker, at
+        if marker in (JPEG_SCAN, JPEG_END):
+            return
+        at += 2 + max(int.from_bytes(data[at + 2 : at + 4]), 2)
+
+
+def _jpeg_objection(data: bytes) -> str:
+    for marker, at in jpeg_markers(data):
+        if marker in JPEG_FRAMES and at + 10 <= len(data):
             height, width = int.from_bytes(data[at + 5 : at + 7]), int.from_bytes(data[at + 7 : at + 9])
             if why := _size_objection(width, height, max(data[at + 9], 3)):
                 return why
-        if marker == _JPEG_SCAN:
-            return "too many scans" if data.count(b"\xff\xda", at) > MOST_SCANS else ""
-        if marker == _JPEG_END:
-            return ""
-        if marker in (0x00, 0xFF) or marker in _JPEG_BARE:
-            at += 1 if marker == 0xFF else 2
-        else:
-            at += 2 + max(int.from_bytes(data[at + 2 : at + 4]), 2)
+        if marker == JPEG_SCAN and data.count(b"\xff\xda", at) > MOST_SCANS:
+            return "too many scans"
     return ""
 
 
@@ -92,10 +103,4 @@ def transport_format(data: bytes) -> str:
 
 def _jpeg_frame(data: bytes) -> int | None:
     """Where a JPEG's frame header is, None for nowhere."""
-    at = len(JPEG_START)
-    while at + 10 <= len(data) and data[at] == 0xFF:
-        marker = data[at + 1]
-        if marker in _JPEG_FRAMES:
-            return at
-        at += 1 if marker == 0xFF else 2 + int.from_bytes(data[at + 2 : at + 4])
-    return None
+    return next((at for marker, at in jpeg_markers(data) if marker in JPEG_FRAMES and at + 10 <= len(data)), None)

@@ -3,15 +3,13 @@
 from dataclasses import dataclass
 
 from lira.hal.errors import SensorError
-from lira.hal.messages.images import JPEG_START, PNG_START
+from lira.hal.messages.images import JPEG_END, JPEG_FRAMES, JPEG_SCAN, JPEG_START, PNG_START, jpeg_markers
 
 EXIF = b"Exif\0\0"
 UPRIGHT = 1
 SIDEWAYS = 5  # from here on width and height are exchanged
 _ORIENTATION = 0x0112
-_FRAMES = frozenset({*range(0xC0, 0xD0)} - {0xC4, 0xC8, 0xCC})  # ITU T.81, table B.1
-_BARE = frozenset({0x00, 0x01, *range(0xD0, 0xD9)})  # markers without a length, and what is none
-_TABLES, _SCAN, _END, _APP1 = 0xC4, 0xDA, 0xD9, 0xE1
+_TABLES, _APP1 = 0xC4, 0xE1  # markers (ITU T.81, table B.1)
 _SIXTEEN = 16
 
 
@@ -47,25 +45,20 @@ def _read_png(data: bytes) -> Header:
 
 def _read_jpeg(data: bytes) -> Header:
     size: tuple[int, int] | None = None
+    scan: int | None = None
     orientation, has_tables = UPRIGHT, False
-    at = len(JPEG_START)
-    while (at := data.find(b"\xff", at)) >= 0 and at + 4 <= len(data):
-        marker, length = data[at + 1], int.from_bytes(data[at + 2 : at + 4])
-        if marker == 0xFF or marker in _BARE:
-            at += 1 if marker == 0xFF else 2
-            continue
-        if marker in _FRAMES:
+    for marker, at in jpeg_markers(data):
+        if marker in JPEG_FRAMES:
             size = int.from_bytes(data[at + 7 : at + 9]), int.from_bytes(data[at + 5 : at + 7])
         has_tables |= marker == _TABLES
         if marker == _APP1:
-            orientation = _orientation(data[at + 4 : at + 2 + length])
-        if marker == _SCAN:
-            break
-        at += 2 + max(length, 2)
+            orientation = _orientation(data[at + 4 : at + 2 + int.from_bytes(data[at + 2 : at + 4])])
+        if marker == JPEG_SCAN:
+            scan = at
     if size is None or not all(size):
         raise SensorError("a JPEG does not say how large it is")
     # Nothing within the picture's own data looks like the end, and what a camera appends may.
-    if data.find(bytes((0xFF, _END)), max(at, 0)) < 0:
+    if scan is None or data.find(bytes((0xFF, JPEG_END)), scan) < 0:
         raise SensorError(f"a JPEG of {len(data)} bytes is cut off before its end")
     return Header(*size, orientation, has_tables)
 

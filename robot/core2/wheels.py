@@ -56,12 +56,9 @@ class Reckoner:
 
     def _advance(self, before: Pose, after: Pose) -> None:
         settings = self._settings
-        east_m, north_m = after.x_m - before.x_m, after.y_m - before.y_m
-        if math.hypot(east_m, north_m) > JUMP_M:
+        if math.hypot(after.x_m - before.x_m, after.y_m - before.y_m) > JUMP_M:
             return
-        turn_rad = math.remainder(after.yaw_rad - before.yaw_rad, math.tau)
-        heading_rad = before.yaw_rad + turn_rad / 2
-        ahead_m = east_m * math.cos(heading_rad) + north_m * math.sin(heading_rad)
+        ahead_m, turn_rad = travelled(before, after)
         ahead_m = settings.distance_scale * (ahead_m - settings.spin_slip_m_rad * turn_rad)
         turn_rad *= settings.turn_scale
         pose = self._pose
@@ -71,3 +68,11 @@ class Reckoner:
             pose.y_m + ahead_m * math.sin(heading_rad),
             pose.yaw_rad + turn_rad,
         )
+
+
+def travelled(before: Pose | Odometry, after: Pose | Odometry) -> tuple[float, float]:
+    """How far ahead a robot went between two poses, metres, and how far it turned to the left, radians."""
+    turn_rad = math.remainder(after.yaw_rad - before.yaw_rad, math.tau)
+    heading_rad = before.yaw_rad + turn_rad / 2
+    east_m, north_m = after.x_m - before.x_m, after.y_m - before.y_m
+    return east_m * math.cos(heading_rad) + north_m * math.sin(heading_rad), turn_rad

@@ -7,7 +7,7 @@ import cv2
 import numpy as np
 import pytest
 
-from lira.hal.messages.images import MOST_SCANS, PNG_START, objection
+from lira.hal.messages.images import MOST_SCANS, PNG_START, objection, size_of
 
 
 def png(width, height, bits, kind):
@@ -71,3 +71,12 @@ def test_a_jpeg_of_ever_more_scans_is_none():
 @pytest.mark.parametrize("data", [b"", b"BM" + bytes(60), b"RIFF....WEBP", PNG_START, PNG_START + bytes(30)])
 def test_other_formats_and_beginnings_are_none(data):
     assert objection(data)
+
+
+@pytest.mark.parametrize("between", [b"", b"junk", b"\xff\xff", b"\x00\xff\x00"])
+def test_a_size_is_read_where_the_decoder_reads_it(between):
+    head, tables, rest = jpeg(33, 17).partition(b"\xff\xdb")
+    picture = head + between + tables + rest
+    decoded = cv2.imdecode(np.frombuffer(picture, np.uint8), cv2.IMREAD_COLOR)
+    assert objection(picture) == ""
+    assert size_of(picture) == (33, 17) == decoded.shape[1::-1]

@@ -221,6 +221,17 @@ def test_nobody_there_is_said_with_the_remedy():
         bus.close()
 
 
+def test_after_close_it_says_so_and_commands_nothing_more():
+    with served(real_time_null()) as robot, remote(robot) as client:
+        get_going(client)
+        client.close()
+        client.close()
+        for asked in (client.now, client.read, client.state, lambda: client.drive(Command(GO, 0.0))):
+            with pytest.raises(BusError, match="closed"):
+                asked()
+        wait_for(lambda: is_still(robot))
+
+
 def test_the_profile_comes_over_the_bus():
     with served(real_time_null()) as robot, remote(robot) as client:
         assert client.profile == PROFILE

@@ -7,26 +7,24 @@ command that answers it. The echo sends the same scan's bytes there and back, in
 import statistics
 import sys
 import time
-from pathlib import Path
-from tempfile import TemporaryDirectory
 
 import numpy as np
 
 from lira.hal.bus.attachment import Attachment
-from lira.hal.bus.topics import APPLIED, SCAN
 from lira.hal.client.connect import connect
 from lira.hal.errors import BusError
-from lira.hal.messages import STOP, Command, LaserScan
+from lira.hal.messages import STOP, LaserScan
 from lira.hal.messages.codec import encode
 from lira.tools.bench import Row
-from lira.tools.bench.parts import echo, null_robot
+from lira.tools.bench.parts import echo
+from lira.tools.bench.parts.answers import Answers
+from lira.tools.bench.parts.robots import READY_S, null_robot_at_work
 from lira.tools.launch.processes import ChildProcess, free_port
 
 RUNS = 3
 SCANS = 150
 SCAN_HZ = 40.0
 WARM_UP = 20
-READY_S = 30.0
 LIMIT_S = 30.0
 POLL_S = 0.0005
 
@@ -40,18 +38,11 @@ def run() -> list[Row]:
 
 def measure() -> dict[str, float]:
     """Measure the stack and the echo side by side."""
-    port, echo_port = free_port(), free_port()
-    name, endpoint, echo_endpoint = f"bench_{port}", f"127.0.0.1:{port}", f"127.0.0.1:{echo_port}"
-    python = [sys.executable, "-m"]
-    robot = [*python, "lira.tools.bench.parts.null_robot", name, endpoint, str(SCAN_HZ)]
+    echo_endpoint = f"127.0.0.1:{free_port()}"
     with (
-        TemporaryDirectory() as folder,
-        ChildProcess("the robot", robot, Path(folder) / "lira.robot.log") as server,
-        ChildProcess(
-            "the echo", [*python, "lira.tools.bench.parts.echo", echo_endpoint], Path(folder) / "echo.log"
-        ) as mirror,
+        null_robot_at_work(str(SCAN_HZ)) as (name, endpoint, folder),
+        ChildProcess("the echo", [sys.executable, "-m", echo.__name__, echo_endpoint], folder / "echo.log") as mirror,
     ):
-        server.wait_ready(null_robot.READY, READY_S)
         mirror.wait_ready(echo.READY, READY_S)
         stack_ms, scan = measure_stack(name, endpoint)
         echo_ms = measure_echo(echo_endpoint, scan)
@@ -70,26 +61,16 @@ def measure() -> dict[str, float]:
 def measure_stack(name: str, endpoint: str) -> tuple[list[float], LaserScan]:
     """Answer every scan at once, and find when each answer was applied."""
     with connect(endpoint, name) as robot:
-        results = robot.bus.reader(APPLIED, depth=64)
-        scans = robot.bus.reader(SCAN)
-        captured_s: dict[int, float] = {}
-        taken_ms: dict[int, float] = {}
+        answers = Answers(robot, STOP)
+        taken_ms: list[float] = []
         deadline_s = time.monotonic() + LIMIT_S
         while len(taken_ms) < SCANS + WARM_UP and time.monotonic() < deadline_s:
-            for received in scans.poll():
-                if received.attachment is not None:
-                    seq = received.attachment.seq
-                    captured_s[seq] = received.message.stamp_s
-                    robot.drive(Command(STOP, robot.now(), answers=seq))
-            for result in results.poll():
-                seq = result.message.answers
-                if seq in captured_s:
-                    taken_ms.setdefault(seq, 1e3 * (result.message.stamp_s - captured_s[seq]))
+            taken_ms += answers.poll()
             time.sleep(POLL_S)
-        newest = scans.newest()
+        newest = answers.scans.newest()
         if newest is None or len(taken_ms) < SCANS + WARM_UP:
             raise BusError(f"{len(taken_ms)} of {SCANS + WARM_UP} commands were applied", "Is the machine overloaded?")
-        return list(taken_ms.values())[WARM_UP:], newest.message
+        return taken_ms[WARM_UP:], newest.message
 
 
 def measure_echo(endpoint: str, scan: LaserScan) -> list[float]:

@@ -11,7 +11,6 @@ import statistics
 import time
 from functools import partial
 from pathlib import Path
-from tempfile import TemporaryDirectory
 
 from lira.fusion.control import ControlLoop
 from lira.fusion.inference.threads import one_thread
@@ -26,7 +25,7 @@ from lira.hal.client.connect import connect
 from lira.hal.client.remote import RemoteArena, RemoteRobot
 from lira.hal.messages import Episode, Phase
 from lira.tools.bench import Row
-from lira.tools.launch.processes import ChildProcess, free_port, lira_command
+from lira.tools.bench.parts.robots import twin_at_work
 from lira.tools.runs.build import build_method
 from lira.tools.runs.names import LABELS, RECORD
 
@@ -35,7 +34,6 @@ WORLD = "race"
 SIMULATED_S = 120.0
 WARM_UP_S = 5.0
 PUT_ON_M = 1.0
-READY_S = 60.0
 
 
 def run() -> list[Row]:
@@ -49,28 +47,9 @@ def run() -> list[Row]:
 
 def measure(layout: int) -> dict[str, float]:
     """Drive one layout and return how many simulated seconds went by per second, and what was done in them."""
-    port = free_port()
-    name, endpoint = f"bench_{port}", f"127.0.0.1:{port}"
-    words = [
-        "--name",
-        name,
-        "--world",
-        WORLD,
-        "--layout",
-        str(layout),
-        "--listen",
-        endpoint,
-        "--lockstep",
-        "--renderer",
-        "sketch",
-    ]
-    with (
-        TemporaryDirectory() as folder,
-        ChildProcess("the twin", lira_command("twin", *words), Path(folder) / "twin.log") as twin,
-    ):
-        twin.wait_ready("serves world", READY_S)
-        with connect(endpoint, name) as robot:
-            return drive(robot, layout, Path(folder))
+    words = ["--world", WORLD, "--layout", str(layout), "--lockstep", "--renderer", "sketch"]
+    with twin_at_work(*words) as (name, endpoint, folder), connect(endpoint, name) as robot:
+        return drive(robot, layout, folder)
 
 
 def drive(robot: RemoteRobot, layout: int, folder: Path) -> dict[str, float]:

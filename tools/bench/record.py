@@ -4,28 +4,25 @@ A driver answers every scan of a twin in real time. Beside it a watcher hears ev
 pictures are sent in both; what the watcher heard and the recorder did not write is lost.
 """
 
-import os
 import statistics
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
-from tempfile import TemporaryDirectory
 
-from lira.hal.bus.reader import Reader, Tap
-from lira.hal.bus.topics import APPLIED, SCAN
+from lira.hal.bus.reader import Tap
 from lira.hal.client.connect import connect, on_bus
-from lira.hal.client.remote import RemoteRobot
-from lira.hal.messages import Applied, Command, LaserScan, Twist
-from lira.tools.bench import Row
-from lira.tools.launch.processes import ChildProcess, free_port, lira_command
+from lira.hal.messages import Twist
+from lira.tools.bench import Row, cpu_s
+from lira.tools.bench.parts.answers import Answers
+from lira.tools.bench.parts.robots import READY_S, twin_at_work
+from lira.tools.launch.processes import ChildProcess, lira_command
 from lira.tools.recording.beside import READY
 from lira.tools.recording.reader import Recording
 
 MINUTES = 1.0  # of each half, all turns together
 TURNS = 3
-READY_S = 60.0
 WARM_UP_S = 2.0
 POLL_S = 0.001
 MOST_CPU = 0.10  # of a core
@@ -49,22 +46,15 @@ class Half:
 
 def run(minutes: float = MINUTES) -> list[Row]:
     """Return one row: the two halves side by side."""
-    port = free_port()
-    name, endpoint = f"bench_{port}", f"127.0.0.1:{port}"
-    twin = ["twin", "--world", "room", "--profile", "rosbot2", "--renderer", "sketch"]
     without, beside = Half(), Half()
     with (
-        TemporaryDirectory() as folder,
-        ChildProcess(
-            "the twin", lira_command(*twin, "--name", name, "--listen", endpoint), Path(folder) / "twin.log"
-        ) as process,
+        twin_at_work("--world", "room", "--profile", "rosbot2", "--renderer", "sketch") as (name, endpoint, folder),
+        driver(name, endpoint) as pair,
     ):
-        process.wait_ready("serves world", READY_S)
-        with driver(name, endpoint) as pair:
-            drive(pair, WARM_UP_S, Half())
-            for turn in range(TURNS):
-                drive(pair, 60.0 * minutes / TURNS, without)
-                record(pair, (name, endpoint), Path(folder) / f"rec{turn}", 60.0 * minutes / TURNS, beside)
+        drive(pair, WARM_UP_S, Half())
+        for turn in range(TURNS):
+            drive(pair, 60.0 * minutes / TURNS, without)
+            record(pair, (name, endpoint), folder / f"rec{turn}", 60.0 * minutes / TURNS, beside)
     return [row(without, beside)]
 
 
@@ -97,9 +87,7 @@ def quantiles(values: list[float]) -> tuple[float, float]:
 class Pair:
     """The driver and the watcher."""
 
-    robot: RemoteRobot
-    scans: Reader[LaserScan]
-    results: Reader[Applied]
+    answers: Answers
     tap: Tap
 
 
@@ -107,26 +95,15 @@ class Pair:
 def driver(name: str, endpoint: str) -> Iterator[Pair]:
     """Open both ends."""
     with connect(endpoint, name) as robot, on_bus(endpoint, name, watch=True) as watch:
-        yield Pair(robot, robot.bus.reader(SCAN), robot.bus.reader(APPLIED, depth=64), watch.tap())
+        yield Pair(Answers(robot, TURN), watch.tap())
 
 
 def drive(pair: Pair, seconds: float, half: Half) -> Heard:
     """Answer every scan for so long, and note how soon each answer was applied. Returns what the watcher heard."""
-    captured_s: dict[int, float] = {}
-    answered: set[int] = set()
     heard: Heard = set()
     began_s = time.monotonic()
     while (now_s := time.monotonic()) < began_s + seconds:
-        for received in pair.scans.poll():
-            if received.attachment is not None:
-                seq = received.attachment.seq
-                captured_s[seq] = received.message.stamp_s
-                pair.robot.drive(Command(TURN, pair.robot.now(), answers=seq))
-        for result in pair.results.poll():
-            seq = result.message.answers
-            if seq in captured_s and seq not in answered:
-                answered.add(seq)
-                half.answers_ms.append(1e3 * (result.message.stamp_s - captured_s[seq]))
+        half.answers_ms += pair.answers.poll()
         heard |= {(each.key, each.attachment, each.payload) for each in pair.tap.poll()}
         time.sleep(POLL_S)
     half.seconds += now_s - began_s
@@ -147,9 +124,3 @@ def record(pair: Pair, address: tuple[str, str], folder: Path, seconds: float, h
     half.messages += len(heard)
     half.lost += len(heard - written)
     half.size_bytes += sum(path.stat().st_size for path in recording.files)
-
-
-def cpu_s(pid: int) -> float:
-    """Seconds of a core that a process has used."""
-    fields = Path(f"/proc/{pid}/stat").read_text(encoding="utf-8").rpartition(")")[2].split()
-    return sum(map(int, fields[11:13])) / os.sysconf("SC_CLK_TCK")

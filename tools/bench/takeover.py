@@ -9,13 +9,10 @@ import os
 import random
 import select
 import struct
-import sys
 import threading
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from pathlib import Path
-from tempfile import TemporaryDirectory
 from typing import Protocol
 
 import numpy as np
@@ -26,14 +23,14 @@ from lira.hal.client.connect import connect, on_bus
 from lira.hal.errors import BusError
 from lira.hal.messages import HELD, STOP, Applied, Command, Source, Twist
 from lira.tools.bench import Row
-from lira.tools.bench.parts import null_robot, page
+from lira.tools.bench.parts import page
+from lira.tools.bench.parts.robots import null_robot_at_work
 from lira.tools.joystick.axes import AxisRange, PadEvent, PadState
 from lira.tools.joystick.bridge import Bridge
 from lira.tools.joystick.client import TeleopClient
 from lira.tools.joystick.known_pads import PadMemory
 from lira.tools.joystick.pads.codes import AXES, BUTTONS, EV_ABS, EV_KEY, EV_SYN
 from lira.tools.joystick.pads.mapping import load_mapping
-from lira.tools.launch.processes import ChildProcess, free_port
 
 SAMPLES = 150
 WARM_UP = 5
@@ -103,16 +100,12 @@ class PipePad:
 
 def run() -> list[Row]:
     """Return a row for the pad and one for the page."""
-    port = free_port()
-    name, endpoint = f"bench_{port}", f"127.0.0.1:{port}"
-    robot = [sys.executable, "-m", "lira.tools.bench.parts.null_robot", name, endpoint]
-    with TemporaryDirectory() as folder, ChildProcess("the robot", robot, Path(folder) / "lira.robot.log") as server:
-        server.wait_ready(null_robot.READY, READY_S)
+    with null_robot_at_work() as (name, endpoint, folder):
         pad = PipePad()
         with policy(name, endpoint):
             with bridge(name, endpoint, pad):
                 by_pad = measure(name, endpoint, pad)
-            with page.page_of(name, endpoint, Path(folder)) as thumb:
+            with page.page_of(name, endpoint, folder) as thumb:
                 by_page = measure(name, endpoint, thumb)
     return [row("pad", by_pad), row("web", by_page)]
 

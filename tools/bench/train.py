@@ -1,5 +1,8 @@
 """One training step (50 updates of 32) beside a plain float32 PyTorch loop, and what it does to the control loop.
 
+Where Keras and TensorFlow are installed (`pip install keras tensorflow-cpu`; they are no dependency), it is put beside
+these, too.
+
 From scratch, with f = 16, a step is 22 GFLOP, nearly eight tenths of them the second convolution forward and back;
 more than half of the time goes into PyTorch's convolutions (oneDNN). On one core of a Xeon the step runs at 51 GFLOP/s,
 where products of matrices of these shapes reach 108 and large ones 160: with the convolutions written out as such
@@ -8,6 +11,7 @@ products a step could be about 1.4 times as fast, no more.
 
 import statistics
 import time
+from typing import Protocol
 
 import numpy as np
 import torch
@@ -20,7 +24,7 @@ from lira.fusion.learning.trainer import ProcessTrainer
 from lira.fusion.policies.networks import ExpertNet, FusionNet
 from lira.fusion.preprocess import Features, Shape
 from lira.hal.messages import Driver
-from lira.tools.bench import Row
+from lira.tools.bench import Row, keras_reference
 
 RUNS = 5
 LABELS = 300
@@ -32,6 +36,13 @@ BINS = {16: 101, 32: 130}  # by filters: the simulated and the real robot
 TRUNKS = ("full", "frozen")
 
 
+class Trains(Protocol):
+    """Whoever runs a training step."""
+
+    def train_step(self) -> object:
+        """Run one training step."""
+
+
 def run() -> list[Row]:
     """Return one row per network and kind of training. All on one thread."""
     one_thread()
@@ -40,7 +51,9 @@ def run() -> list[Row]:
         labels = random_labels(bins)
         plain = PlainLearner(filters, labels)
         learners = {trunks: make_learner(filters, trunks, labels) for trunks in TRUNKS}
-        contenders: dict[str, Learner | PlainLearner] = {"plain": plain, **learners}
+        contenders: dict[str, Trains] = {"plain": plain, **learners}
+        if keras_reference.installed():
+            contenders["keras"] = keras_reference.KerasLearner(filters, labels, UPDATES, BATCH)
         seconds: dict[str, list[float]] = {name: [] for name in contenders}
         for k in range(1 + RUNS):
             for name, learner in contenders.items():
@@ -56,6 +69,7 @@ def run() -> list[Row]:
                 "step_s": median[trunks],
                 "reference_s": median["plain"],
                 "speedup": median["plain"] / median[trunks],
+                **({"keras_speedup": median["keras"] / median[trunks]} if "keras" in median else {}),
                 **control_loop(learners[trunks], filters, labels),
             }
             for trunks in TRUNKS

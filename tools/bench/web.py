@@ -5,20 +5,17 @@ Three clients read what pages read, each as fast as it comes; one of them has th
 """
 
 import asyncio
-import os
 import time
-from pathlib import Path
-from tempfile import TemporaryDirectory
 
 import aiohttp
 
 from lira.hal.errors import BusError
-from lira.tools.bench import Row
+from lira.tools.bench import Row, cpu_s
+from lira.tools.bench.parts.robots import READY_S, twin_at_work
 from lira.tools.launch.processes import ChildProcess, free_port, lira_command
 
 CLIENTS = 3
 WATCH_S = 8.0
-READY_S = 60.0
 PICTURE_S = 10.0
 SAY_S = 0.04
 FILES = ("/", "/static/page.css", "/static/page.js", "/static/hands.js", "/static/draw.js", "/static/icon.svg")
@@ -26,16 +23,10 @@ FILES = ("/", "/static/page.css", "/static/page.js", "/static/hands.js", "/stati
 
 def run() -> list[Row]:
     """Return a row for what is fetched and how soon, and one for what it costs."""
-    port, page = free_port(), free_port()
-    robot = ["--name", f"bench_{port}", "--connect", f"127.0.0.1:{port}"]
-    twin = ["twin", "--name", robot[1], "--listen", robot[3], "--world", "line-obstacles"]
-    with (
-        TemporaryDirectory() as folder,
-        ChildProcess("the twin", lira_command(*twin), Path(folder) / "twin.log") as served,
-    ):
-        served.wait_ready("serves world", READY_S)
-        web = lira_command("web", *robot, "--port", str(page))
-        with ChildProcess("lira web", web, Path(folder) / "web.log") as shown:
+    page = free_port()
+    with twin_at_work("--world", "line-obstacles") as (name, endpoint, folder):
+        web = lira_command("web", "--name", name, "--connect", endpoint, "--port", str(page))
+        with ChildProcess("lira web", web, folder / "web.log") as shown:
             shown.wait_ready("web shows", READY_S)
             return asyncio.run(measure(f"http://127.0.0.1:{page}", shown.pid))
 
@@ -90,9 +81,3 @@ async def look(session: aiohttp.ClientSession, url: str, *, drives: bool) -> tup
                     said_s = now_s
                     await socket.send_json({"type": "say", "input": {"seen": message.json()["time"]}})
     return frames, pictures
-
-
-def cpu_s(pid: int) -> float:
-    """Processor time of a process so far, from the kernel's /proc."""
-    after_name = Path(f"/proc/{pid}/stat").read_text(encoding="ascii", errors="replace").rpartition(")")[2].split()
-    return (int(after_name[11]) + int(after_name[12])) / os.sysconf("SC_CLK_TCK")
