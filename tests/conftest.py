@@ -52,8 +52,7 @@ def pytest_addoption(parser: pytest.Parser) -> None:
 
 
 def pytest_configure(config: pytest.Config) -> None:
-    """Keep a worker to itself. What it imports and collects stays: to look there for garbage takes a second or more."""
-    gc.disable()
+    """Keep a worker to itself."""
     if hasattr(config, "workerinput") and sys.platform == "linux":
         take_own_loopback()
 
@@ -86,10 +85,15 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
         items[:] = [item for item in items if item.get_closest_marker("alone") or item.nodeid in left_open]
 
 
-def pytest_collection_finish() -> None:
-    """Collect the garbage of tests, and of nothing before them."""
-    gc.freeze()
-    gc.enable()
+@pytest.hookimpl(wrapper=True)
+def pytest_collection() -> Generator[None, object, object]:
+    """Import and collect. All of that stays: to look there for garbage takes seconds, now and during the tests."""
+    gc.disable()
+    try:
+        return (yield)
+    finally:
+        gc.freeze()
+        gc.enable()
 
 
 def pytest_runtest_logreport(report: pytest.TestReport) -> None:

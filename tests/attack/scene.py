@@ -37,19 +37,25 @@ class Scene:
         log = self._folder / f"driver{self._count}.txt"
         return self._start(["peer.py", "drive", self.name, self.endpoint, str(log)], "drives"), log
 
-    def attacker(self, how, size, keys):
-        return self._start(
-            ["peer.py", how, self.name, self.endpoint, str(size), *keys], {"ask": "asks"}.get(how, "floods")
-        )
+    def attackers(self, attacks):
+        """Start one for each, all at once, so that none has the robot to itself for long."""
+        peers = [["peer.py", how, self.name, self.endpoint, str(size), *keys] for how, size, keys in attacks]
+        started = [self._launch(words) for words in peers]
+        for child, (how, *_) in zip(started, attacks, strict=True):
+            child.wait_ready({"ask": "asks", "flood": "floods"}[how], READY_S)
+        return started
 
     def _start(self, words, ready):
-        self._count += 1
-        log = self._folder / f"process{self._count}.log"
-        child = self._stack.enter_context(
-            ChildProcess(words[1], [sys.executable, str(HERE / words[0]), *words[1:]], log)
-        )
+        child = self._launch(words)
         child.wait_ready(ready, READY_S)
         return child
+
+    def _launch(self, words):
+        self._count += 1
+        log = self._folder / f"process{self._count}.log"
+        return self._stack.enter_context(
+            ChildProcess(words[1], [sys.executable, str(HERE / words[0]), *words[1:]], log)
+        )
 
     def orders(self):
         """What the base was told: [(seconds, m/s)]."""

@@ -36,7 +36,7 @@ def test_whoever_floods_the_wheels_stop_in_time_and_memory_stays_small(kind, att
         before_mb = scene.memory_mb()
         driver, commands = scene.driver()
         assert scene.wait(scene.moves, 10.0)
-        attackers = [scene.attacker(*attack) for attack in attacks]
+        attackers = scene.attackers(attacks)
         time.sleep(FLOOD_S)
         scene.wait(scene.moves, 1.5)  # a flood may keep the driver's commands away; then it stands
         kill(driver)

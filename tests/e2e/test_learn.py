@@ -39,7 +39,7 @@ def demos(world, tmp_path_factory):
     """Two demos at the same time, so that they get in each other's way."""
     folder = tmp_path_factory.mktemp("demos")
     words = ["demo", "--world", str(world), "--laps", str(LAPS), "--unseen", "1"]
-    words += ["--method", "hold", "--layouts", "own", "--proof", "own", "--run"]
+    words += ["--method", "hold", "--layouts", "own", "--proof", "own", "--no-record", "--run"]
     runs = [folder / name for name in ("first", "second")]
     children = [ChildProcess(run.name, lira_command(*words, str(run)), folder / f"{run.name}.log") for run in runs]
     try:

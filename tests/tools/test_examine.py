@@ -59,9 +59,18 @@ def test_behind_a_shield_it_hits_none_and_how_often_that_was_so_is_told(lira, tm
 
 
 def test_a_scripted_lesson_is_told_lap_by_lap(lira, tmp_path):
-    words = ("--method", "hg-dagger", "--teacher", "perfect", "--train-laps", "1", "--run", str(tmp_path / "run"))
+    words = (
+        "--method",
+        "hg-dagger-kernel",
+        "--teacher",
+        "perfect",
+        "--train-laps",
+        "1",
+        "--run",
+        str(tmp_path / "run"),
+    )
     _, lines = lira(write_world(tmp_path), "fusion", *words)
-    assert lines[0].startswith("hg-dagger (hg-dagger) on ")
+    assert lines[0].startswith("hg-dagger (hg-dagger-kernel) on ")
     assert [line.split()[0] for line in lines[1:3]] == ["training", "proving"]
     assert any(line.startswith("saved ") and "the novice after" in line for line in lines)
     assert "1 training lap: the novice alone" in lines[-1]

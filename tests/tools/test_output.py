@@ -31,25 +31,27 @@ def one_line_and_remedy(done):
     return done.returncode == 2 and what.startswith("lira") and remedy.startswith("  ")
 
 
-@pytest.mark.parametrize(
-    "words", [["--help"], ["twin", "--help"], ["labels", "check", "{log}"], ["labels", "check", "{log}", "--json", "-"]]
-)
-def test_a_full_disk_behind_standard_output(tmp_path, words):
+@pytest.fixture
+def log(tmp_path):
     from lira.fusion.log.label_log import DemonstrationLog
     from lira.hal.profile import load_profile
 
     DemonstrationLog(tmp_path / "log", load_profile("thesis-sim")).close()
+    return tmp_path / "log"
+
+
+@pytest.mark.parametrize(
+    "words", [["--help"], ["twin", "--help"], ["labels", "check", "{log}"], ["labels", "check", "{log}", "--json", "-"]]
+)
+def test_a_full_disk_behind_standard_output(log, words):
     with FULL.open("w") as full:
-        done = lira(*[word.format(log=tmp_path / "log") for word in words], stdout=full)
+        done = lira(*[word.format(log=log) for word in words], stdout=full)
     assert one_line_and_remedy(done), done.stderr
     assert "No space left on device" in done.stderr
 
 
-def test_a_full_disk_behind_json(tmp_path):
-    done = lira("bench", "preprocess", "--json", "/dev/full")
-    assert one_line_and_remedy(done), done.stderr
-    with FULL.open("w") as full:
-        done = lira("bench", "preprocess", "--json", "-", stdout=full)
+def test_a_full_disk_behind_json(log):
+    done = lira("labels", "check", log, "--json", FULL)
     assert one_line_and_remedy(done), done.stderr
 
 

@@ -3,6 +3,7 @@
 import contextlib
 import json
 import math
+import os
 import socket
 import subprocess
 import sys
@@ -17,6 +18,7 @@ from lira.hal.messages import Reason, Twist
 from lira.tools.cli import main
 from lira.tools.launch.link_fault import Narrows, Relay
 from lira.tools.launch.processes import free_port
+from lira.tools.stop_test import matrix
 from lira.tools.stop_test.cull import cull, judge_mutant, rows_of
 from lira.tools.stop_test.journal import Heard, Journal, JournalReader, JournalWriter, Said, Sent, Truth, Wheels
 from lira.tools.stop_test.matrix import Matrix, missing
@@ -24,8 +26,10 @@ from lira.tools.stop_test.mutants import MUTANTS, MutantError, break_product, sw
 from lira.tools.stop_test.parts.sender import Pen
 from lira.tools.stop_test.rows import ROWS
 from lira.tools.stop_test.setups import clock_library
+from lira.tools.stop_test.starved import longest_s, waits_s
 from lira.tools.stop_test.verdict import Bounds, Rules, judge, summarize
 
+pytestmark = pytest.mark.slow
 STEP_S = 0.05
 RULES = Rules(began_s=0.5, broken_s=1.0, mended_s=2.0, end_s=3.0)
 BOUNDS = Bounds(budget_s=0.35, stoppers=frozenset({"watchdog"}))
@@ -266,6 +270,23 @@ def test_a_row_has_its_columns_and_the_worst_trial_decides():
         assert not row["passed"], flaw
         assert row["n"] == 3
     assert set(row) >= {"fault", "p50_s", "p99_s", "max_time_to_zero_s", "budget_s", "distance_m", "refused", "asked"}
+
+
+@pytest.mark.parametrize(("words", "tried"), [({}, 1), ({"stall_s": 0.1}, 3), ({"waited_s": 0.5}, 3)])
+def test_a_trial_that_fails_is_repeated_only_where_the_machine_had_no_time(words, tried, monkeypatch):
+    failed, trials = replace(verdict_of(sound()), zero_s=9.0, **words), []
+    monkeypatch.setattr(matrix, "try_row", lambda *trial: trials.append(trial) or failed)
+    assert matrix.try_fairly(None, ROWS[0], BOUNDS, 0.0) == failed
+    assert len(trials) == tried
+
+
+def test_who_is_ready_to_run_and_may_not_has_waited():
+    before = waits_s([os.getpid(), 2**22 + 1])
+    assert before
+    assert all(wait_s >= 0.0 for wait_s in before.values())
+    later = {thread: wait_s + 0.1 for thread, wait_s in before.items()} | {"new": 0.3}
+    assert longest_s(before, later) == pytest.approx(0.3)
+    assert longest_s(before, {}) == 0.0
 
 
 def test_what_has_to_be_counted_and_is_not_fails():

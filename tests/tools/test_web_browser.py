@@ -16,7 +16,7 @@ from selenium.webdriver.common.action_chains import ActionChains  # noqa: E402
 from selenium.webdriver.common.by import By  # noqa: E402
 from selenium.webdriver.common.keys import Keys  # noqa: E402
 
-pytestmark = needs_browser
+pytestmark = [pytest.mark.slow, needs_browser]
 LONGEST_S = 0.35  # from the last command until the wheels have zero
 FAKE_PAD = """
 window.pad = { id: "A pad (STANDARD)", connected: true, mapping: "standard", axes: [0, 0, 0, 0],

@@ -15,11 +15,13 @@ from lira.tools.stop_test.acts import StopTestError
 from lira.tools.stop_test.mutants import Mutant
 from lira.tools.stop_test.rows import Row
 from lira.tools.stop_test.setups import Setup, clock_library
+from lira.tools.stop_test.starved import longest_s
 from lira.tools.stop_test.testbed import SETTLE_S, ProcessBench, open_bench
 from lira.tools.stop_test.verdict import ASKED, Bounds, Result, Rules, Verdict, judge, summarize, within
 
 ATTEMPTS = 5
 REPEATS, STALL_S = 2, 0.06
+WAITED_S = 0.2  # in a trial of some seconds; beside an idle machine's processes it is a tenth of that
 ASKED_S = 8.0  # until motion has been asked for often enough; a link may have to come back first
 WATCH_S = 0.4  # after that: it must not move
 BEFORE_SILENCE_S = 0.3
@@ -83,7 +85,7 @@ def try_fairly(bench: ProcessBench, row: Row, bounds: Bounds, phase_s: float) ->
     """One trial; if it fails while the machine had no time for anybody, another, which may fail as well."""
     verdict = try_row(bench, row, phase_s)
     for _ in range(REPEATS):
-        if within(bounds, verdict) or verdict.stall_s < STALL_S:
+        if within(bounds, verdict) or (verdict.stall_s < STALL_S and verdict.waited_s < WAITED_S):
             break
         verdict = try_row(bench, row, phase_s)
     return verdict
@@ -92,7 +94,7 @@ def try_fairly(bench: ProcessBench, row: Row, bounds: Bounds, phase_s: float) ->
 def try_row(bench: ProcessBench, row: Row, phase_s: float) -> Verdict:
     """One trial: drive, break, wait, mend, ask for motion again, judge."""
     refused_before = _get_going(bench, row, phase_s)
-    broken_s = time.monotonic()
+    waits_s, broken_s = bench.waits_s(), time.monotonic()
     row.make(bench)
     silent_s = -math.inf
     if row.silence:
@@ -105,7 +107,7 @@ def try_row(bench: ProcessBench, row: Row, phase_s: float) -> Verdict:
     rules = replace(_rules(bench, row, broken_s, mended_s), silent_s=silent_s)
     if not row.resumes:
         bench.ask_for_motion()
-    verdict = _watch(bench, rules)
+    verdict = replace(_watch(bench, rules), waited_s=longest_s(waits_s, bench.waits_s()))
     if row.refusal:
         verdict = replace(verdict, refused=bench.refused(row.refusal) - refused_before)
     bench.renew(fatal=row.fatal)

@@ -29,6 +29,7 @@ from lira.tools.stop_test.mutants import Mutant
 from lira.tools.stop_test.parts import driver, hand, pulse, robot, ros2_world, world
 from lira.tools.stop_test.parts.intruder import Intruder
 from lira.tools.stop_test.setups import BRIEF, LAPTOP, Setup
+from lira.tools.stop_test.starved import waits_s
 
 if TYPE_CHECKING:
     from lira.tools.stop_test.keyring import Keyring
@@ -189,6 +190,10 @@ class ProcessBench:
                 self._run_driver()
         self._running[self._tested].signal(signal.SIGCONT)
         tell(self._ports[POLICY], "insist")
+
+    def waits_s(self) -> dict[str, float]:
+        """How long each thread of each process has waited for a processor."""
+        return waits_s(process.pid for process in self._running.values())
 
     def noted(self) -> Journal:
         """What was noted since the robot was put back to its start."""

@@ -68,7 +68,8 @@ class Verdict:
 
     `fault_to_zero_s` counts from the fault: a sensor that freezes, say, is old before anybody can know. `asked` is how
     often motion was asked of the robot once it was mended, `refused` how many commands were refused as they should,
-    `stall_s` for how long at once the machine had no time for anybody.
+    `stall_s` for how long at once the machine had no time for anybody, `waited_s` for how long in all the process of
+    which it had least waited for a processor.
     """
 
     zero_s: float
@@ -80,6 +81,7 @@ class Verdict:
     asked: int = 0
     refused: int = 0
     stall_s: float = 0.0
+    waited_s: float = 0.0
 
 
 @dataclass(frozen=True, slots=True)
