@@ -27,7 +27,7 @@ class PlusSettings(MethodSettings, frozen=True, tag="plus"):
     """What `plus` adds to `lira`. 0 switches a part off, for `sure` None."""
 
     lira: LiraSettings = LiraSettings()
-    prefill: int = 25  # labels the experts give before the human is asked
+    prefill: int = 60  # labels the experts give before the human is asked
     reserve_s: float = 1.0  # an expert's label waits so long for the human's objection
     handover_s: float = 1.0  # an expert that was given control keeps it so long
     sure: float | None = None  # surer than at all but this share of what the human showed, the novice is not helped
