@@ -18,7 +18,7 @@ BENCHES = {
     "takeover": "from pressing the dead-man to the applied command, while a policy drives",
     "web": "the page: what a browser fetches, how soon it sees a picture, what three of them cost",
     "decide": "a decision of three networks, beside the same networks in PyTorch",
-    "train": "one training step, beside a plain PyTorch loop (and Keras, if installed), and what it does to the control loop",
+    "train": "one training step, beside plain PyTorch (and Keras, if installed), and what it does to the control loop",
     "drivers": "what the drivers need of a core, how old a published scan is, what the lidar's line loses in --minutes",
     "step": "where the time of one decision step goes, and of a whole run on line-obstacles",
     "record": "control beside a recorder and without, for --minutes each; the recorder's share of a core, and losses",
