@@ -6,7 +6,7 @@ these, too.
 From scratch, with f = 16, a step is 22 GFLOP, nearly eight tenths of them the second convolution forward and back;
 more than half of the time goes into PyTorch's convolutions (oneDNN). On one core of a Xeon the step runs at 51 GFLOP/s,
 where products of matrices of these shapes reach 108 and large ones 160. Written out as such products, with half as many
-multiplications (Winograd's F(4, 3) along the rows, no copies along the columns), a step took 2 to 6 % less at f = 16 and
+multiplications (Winograd's F(4, 3) along rows, no copies along columns), a step took 2 to 6 % less at f = 16 and
 15 to 19 % less at f = 32: what is saved goes into rewriting rows, pooling and waiting for the cache. It was left out.
 """
 
