@@ -32,11 +32,16 @@ def step(rig: Rig, twist: Twist, hand: Twist | None = None, *, released: bool = 
 
 
 def steps_until(rig: Rig, twist: Twist, wanted, hand: Twist | None = None) -> Applied:
-    """Repeat a step until `wanted(applied)`: over the bus in real time an answer is a step behind."""
+    """Repeat a step until `wanted(applied)`: over the bus in real time an answer is a step behind.
+
+    Where a busy machine lets a robot in real time stop on the way, it is armed again.
+    """
     for _ in range(STEPS):
         applied = step(rig, twist, hand)
         if wanted(applied):
             return applied
+        if rig.real_time and twist != STOP and applied.reason is Reason.NEUTRAL_FIRST:
+            armed(rig)
     raise AssertionError(f"never: {applied}")
 
 
