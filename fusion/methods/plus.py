@@ -27,12 +27,16 @@ class PlusSettings(MethodSettings, frozen=True, tag="plus"):
     """What `plus` adds to `lira`. 0 switches a part off, for `sure` None."""
 
     lira: LiraSettings = LiraSettings()
-    prefill: int = 60  # labels the experts give before the human is asked
+    prefill: int = 25  # labels of the experts before the human is asked, for every expert but the first
     reserve_s: float = 1.0  # an expert's label waits so long for the human's objection
     handover_s: float = 1.0  # an expert that was given control keeps it so long
     sure: float | None = None  # surer than at all but this share of what the human showed, the novice is not helped
     practice: bool = False  # from its first proving run on, the novice drives and the human corrects it
     ask: bool = False  # on unseen layouts it stops and asks where it doubts
+
+    def filled_by(self, experts: int) -> int:
+        """How many labels of so many experts fill the novice: each further one may disagree with the others."""
+        return self.prefill * (experts - 1)
 
     def build(self, context: Context) -> Method:
         """Teach a novice with these experts."""
@@ -80,7 +84,7 @@ class LiraPlus(LiraSpf):
         if self._left:
             action = next(view.action for view in proposal.experts if view.name == self._driver)
             return replace(proposal, choice=Choice(self._driver, action, label=action, given=self._gifts), speed=1.0)
-        if self.novice.stored < self._plus.prefill:
+        if self.novice.stored < self._plus.filled_by(len(self.experts)):
             return self._prefill(proposal)
         if self._practises:
             a_n = self.novice.alone(features)

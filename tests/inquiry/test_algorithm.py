@@ -53,7 +53,7 @@ def test_every_row_of_the_algorithm_has_its_lines(experts, human, lines, words):
 @pytest.mark.parametrize(
     ("moment", "recipe", "novice", "words"),
     [
-        (step(QUIET), PLUS, State(59, 59), "pre-fill: the experts teach before anybody is asked, 59 of 60 labels"),
+        (step(QUIET), PLUS, State(24, 24), "pre-fill: the experts teach before anybody is asked, 24 of 25 labels"),
         (
             step(QUIET, choice=Choice(Driver.NOBODY, (0.0, 0.0), call=Call.FEEDBACK)),
             HOLD,

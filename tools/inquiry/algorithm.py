@@ -36,8 +36,8 @@ def line_of(step: Step, recipe: Recipe | None, novice: State | None) -> Line:
         return _outside(step)
     if choice.given:
         return Line("", f"the human gave {choice.driver} control: its actions are the labels")
-    if plus is not None and novice is not None and novice.labels < plus.prefill:
-        taught = f"{novice.labels} of {plus.prefill} labels"
+    if plus is not None and novice is not None and novice.labels < (most := plus.filled_by(len(experts))):
+        taught = f"{novice.labels} of {most} labels"
         return Line("", f"pre-fill: the experts teach before anybody is asked, {taught} so far")
     if choice.driver == Driver.NOBODY or (novice is not None and novice.steps == 0):
         return Line("", "before the first training step the novice knows nothing: the human is asked to drive")
