@@ -54,10 +54,12 @@ def cluster(*, workers, threads=1):
                 client.wait_for_workers(workers, timeout=START_S)
         yield address
     finally:
-        for process in reversed(processes):
+        for process in reversed(processes):  # a worker takes leave of its scheduler
             process.terminate()
-        for process in processes:
-            process.wait(timeout=20)
+            with suppress(subprocess.TimeoutExpired):
+                process.wait(timeout=10)
+            process.kill()
+            process.wait()
 
 
 def answers(address):
