@@ -15,6 +15,7 @@ import threading
 import time
 from collections.abc import Callable
 from dataclasses import replace
+from typing import TypeVar
 
 from lira.hal.bus.bus import Bus
 from lira.hal.bus.services import Info, ask_info
@@ -35,6 +36,8 @@ from lira.hal.messages import (
     is_neutral,
     session_of,
 )
+
+T = TypeVar("T")
 
 REPEAT_HZ = 20.0
 DECISION_S = 0.5  # age at which a decision is no longer sent
@@ -127,8 +130,7 @@ class RealTimeRobot(RemoteRobot):
 
     def state(self) -> CourseState | None:
         """Ground truth, None if none comes within a moment."""
-        _within(MOMENT_S, lambda: self._states.read(self.now()) is not None)
-        return self._states.read(self.now())
+        return _within(MOMENT_S, lambda: self._states.read(self.now()))
 
     def drive(self, command: Command) -> Applied:
         """Send a command and wait a moment for what the robot says it applied on it.
@@ -253,12 +255,12 @@ class RealTimeRobot(RemoteRobot):
             put(command.twist, time_s, answers=command.answers, released=command.released)
 
 
-def _within(seconds: float, condition: Callable[[], bool]) -> bool:
-    """Wait for a condition for so long; returns whether it came."""
+def _within(seconds: float, look: Callable[[], T]) -> T:
+    """Look until something is there, for so long; returns what was found last."""
     deadline_s = time.monotonic() + seconds
-    while not (holds := condition()) and time.monotonic() < deadline_s:
+    while not (found := look()) and time.monotonic() < deadline_s:
         time.sleep(POLL_S)
-    return holds
+    return found
 
 
 def _results_from(applied: Applied | None, command: Command, sent_s: float) -> bool:
