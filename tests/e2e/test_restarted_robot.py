@@ -3,13 +3,13 @@
 import signal
 import threading
 import time
-from contextlib import contextmanager
+from contextlib import closing, contextmanager
 
 from lira.fusion.log.label_log import read_demonstrations
-from lira.hal.bus.bus import Bus
-from lira.hal.client.connect import open_remote
+from lira.hal.client.connect import on_bus, open_remote
 from lira.hal.messages import STOP, Command, Reason, Source, Twist
 from lira.tools.launch.processes import ChildProcess, free_port, lira_command
+from lira.tools.launch.threads import in_thread
 
 READY_S = 90.0
 SPEED = 3.0  # the first robot's clock is soon so far that nobody would wait for it
@@ -54,8 +54,7 @@ class Place:
 @contextmanager
 def hand(place):
     """Holds the dead-man: at rest for a moment, then ahead; and so again where the robot stands and wants it."""
-    bus = Bus(place.name, connect=place.endpoint)
-    robot, stop = open_remote(bus, answer_s=READY_S), threading.Event()
+    stop = threading.Event()
 
     def drive():
         rest_until_s = time.monotonic() + REST_S
@@ -65,15 +64,12 @@ def hand(place):
             if moves and applied.reason is not Reason.OK:
                 rest_until_s = time.monotonic() + REST_S
 
-    thread = threading.Thread(target=drive)
-    thread.start()
-    try:
+    with (
+        on_bus(place.endpoint, place.name) as bus,
+        closing(open_remote(bus, answer_s=READY_S)) as robot,
+        in_thread(drive, stop),
+    ):
         yield
-    finally:
-        stop.set()
-        thread.join()
-        robot.close()
-        bus.close()
 
 
 def assert_ends(learner, number):

@@ -25,6 +25,7 @@ from lira.hal.messages.codec import encode
 from lira.hal.profile import load_profile
 from lira.tools.cli import main
 from lira.tools.launch.processes import ChildProcess, free_port, lira_command
+from lira.tools.launch.threads import in_thread
 from lira.tools.recording.layout import Head
 from lira.tools.recording.writer import RecordingWriter
 from lira.tools.view.foxglove_viewer import BACKLOG, FoxgloveViewer
@@ -183,14 +184,8 @@ def test_a_port_that_is_taken_is_told(beside, capsys):
 @contextlib.contextmanager
 def streaming(source, viewer):
     stop = threading.Event()
-    thread = threading.Thread(target=stream, args=(source, [viewer], stop))
-    thread.start()
-    try:
+    with contextlib.closing(viewer), in_thread(lambda: stream(source, [viewer], stop), stop):
         yield
-    finally:
-        stop.set()
-        thread.join()
-        viewer.close()
 
 
 def test_a_topic_is_fetched_from_the_robot_only_while_somebody_looks():

@@ -16,6 +16,7 @@ from lira.hal.client.connect import connect
 from lira.hal.messages import STOP, Command, Source, Twist
 from lira.tools.bench.parts import null_robot
 from lira.tools.launch.processes import ChildProcess, free_port, lira_command
+from lira.tools.launch.threads import in_thread
 
 NEEDED = ("chromium", "chromedriver")
 missing = [name for name in NEEDED if shutil.which(name) is None]
@@ -33,14 +34,8 @@ def policy(name, endpoint):
             robot.drive(Command(Twist(0.3, 0.0), robot.now(), answers=robot.read().seq))
             robot.wait(robot.now() + robot.profile.period_s)
 
-    with connect(endpoint, name) as robot:
-        thread = threading.Thread(target=drive)
-        thread.start()
-        try:
-            yield
-        finally:
-            stop.set()
-            thread.join()
+    with connect(endpoint, name) as robot, in_thread(drive, stop):
+        yield
 
 
 @contextlib.contextmanager

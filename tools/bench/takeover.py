@@ -31,6 +31,7 @@ from lira.tools.joystick.client import TeleopClient
 from lira.tools.joystick.known_pads import PadMemory
 from lira.tools.joystick.pads.codes import AXES, BUTTONS, EV_ABS, EV_KEY, EV_SYN
 from lira.tools.joystick.pads.mapping import load_mapping
+from lira.tools.launch.threads import in_thread
 
 SAMPLES = 150
 WARM_UP = 5
@@ -166,7 +167,7 @@ def policy(name: str, endpoint: str) -> Iterator[None]:
                 # A robot that stopped by itself waits for a zero.
                 go = STOP if applied.reason in HELD else Twist(0.5 * robot.profile.base.max_linear_m_s, 0.0)
 
-        with running(drive, stop):
+        with in_thread(drive, stop):
             yield
 
 
@@ -176,17 +177,5 @@ def bridge(name: str, endpoint: str, pad: PipePad) -> Iterator[None]:
     with on_bus(endpoint, name) as bus, on_bus(endpoint, name, watch=True) as watch:
         stop = threading.Event()
         loop = Bridge(TeleopClient(bus, watch, READY_S, lambda _: None), lambda: pad, PadMemory(None), lambda _: None)
-        with running(lambda: loop.run(stop), stop):
+        with in_thread(lambda: loop.run(stop), stop):
             yield
-
-
-@contextmanager
-def running(work: Callable[[], None], stop: threading.Event) -> Iterator[None]:
-    """Work in a thread that ends with the block."""
-    thread = threading.Thread(target=work)
-    thread.start()
-    try:
-        yield
-    finally:
-        stop.set()
-        thread.join()
