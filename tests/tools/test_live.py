@@ -376,7 +376,7 @@ def hold(folder, *, script, laps=3, world="line", unseen=1, practice_s=0.0, floo
         ):
             file.write(room.head)
             journal = Journal(keep=room.keep, write=lambda record: (written.append(record), file.write(record)))
-            room.go_on(journal.ledger)
+            room.before.go_on(journal.ledger)
             course, arena = (None, None) if floor else (Course(profile, place), robot.arena)
             rules = Rules(practice_s, "ada", laps, unseen=unseen)
             board = Board("ada", room.before, journal.ledger, robot.now, told.append, said.append)
@@ -433,7 +433,7 @@ def test_it_goes_on_another_day_with_counts_that_go_on(held):
     plan = Plan(METHODS["plus"], folder=folder)
     with Classroom(plan, load_profile("thesis-sim"), "line", InlineTrainer, print) as room:
         ledger = Ledger()
-        room.go_on(ledger)
+        room.before.go_on(ledger)
         before = session.result()
         assert ledger.labels.stored_human == before.human_labels
         assert ledger.interventions == before.interventions

@@ -5,7 +5,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from lira.fusion.log.counts import NOTHING, Account
+from lira.fusion.log.counts import NOTHING, Account, Ledger
 from lira.fusion.log.run_log import LapRecord, Record, ResultRecord, RunRecord, StepRecord, read_run
 from lira.hal.errors import ConfigError
 from lira.hal.messages import Decision, Driver, Phase
@@ -25,6 +25,11 @@ class Before:
     lost: int = 0
     curve: tuple[float, ...] = ()
     layouts: frozenset[int] = field(default_factory=frozenset)
+
+    def go_on(self, ledger: Ledger) -> None:
+        """Have a ledger count on from here."""
+        if (newest := self.newest) is not None:
+            ledger.go_on(newest.labels, newest.interventions, newest.calls, self.account)
 
 
 def sum_up(records: Iterable[Record], head: RunRecord | None = None) -> Before:

@@ -5,10 +5,9 @@ from pathlib import Path
 from typing import Self
 
 from lira.fusion.experts.tasks import task_of
-from lira.fusion.learning.labels import Label
 from lira.fusion.log.counts import Ledger
 from lira.fusion.log.label_edit import correct, last_intervention, read_heads
-from lira.fusion.log.label_log import Demonstration, DemonstrationLog, read_demonstrations
+from lira.fusion.log.label_log import Demonstration, DemonstrationLog
 from lira.fusion.log.run_log import RunRecord
 from lira.fusion.methods.base import Method
 from lira.fusion.operator_service import Job
@@ -16,7 +15,7 @@ from lira.hal.messages import Driver
 from lira.hal.profile import RobotProfile
 from lira.tools.live.before import days_before
 from lira.tools.runs.build import NewTrainer
-from lira.tools.runs.folder import snapshot
+from lira.tools.runs.folder import learn_again, snapshot
 from lira.tools.runs.names import LABELS, RECORD
 from lira.tools.runs.plan import Plan, build_traced
 from lira.tools.runs.progress import Publish, Say
@@ -54,11 +53,6 @@ class Classroom:
         """Write a label down."""
         self._log.append(label)
 
-    def go_on(self, ledger: Ledger) -> None:
-        """Have a ledger count on from the days before."""
-        if (newest := self.before.newest) is not None:
-            ledger.go_on(newest.labels, newest.interventions, newest.calls, self.before.account)
-
     def undo(self, ledger: Ledger) -> tuple[bool, str]:
         """Take the labels of the last intervention back; the learner begins anew without them."""
         self._log.close()
@@ -94,8 +88,5 @@ class Classroom:
         plan = self._plan
         pair = plan.pair or task_of(self._world)
         method = build_traced(plan, self._profile, self._trainer, pair, self._publish)
-        novice = method.novice
-        for old in read_demonstrations(self.folder / LABELS):
-            if old.stored:
-                method.remember(Label(old.features, old.action, old.source, novice.weight(old.source)))
+        learn_again(method, self.folder / LABELS)
         return method

@@ -52,7 +52,7 @@ def sit(args: argparse.Namespace, plan: Plan, robot: RemoteRobot, rules: Rules, 
         record.write(room.head)
         sessions = robot.bus.publisher(SESSION)
         journal = Journal(keep=room.keep, write=record.write, publish=publish)
-        room.go_on(journal.ledger)
+        room.before.go_on(journal.ledger)
         hand = stack.enter_context(hand_of(args))
         loop = ControlLoop(robot, truth=None if arena is None else robot.state)
         board = Board(

@@ -5,9 +5,11 @@ from dataclasses import replace
 from pathlib import Path
 
 from lira.fusion.inference.checkpoint import Checkpoint, save_checkpoint
+from lira.fusion.learning.labels import Label
 from lira.fusion.learning.learned_policy import Contradiction, LearnedPolicy
 from lira.fusion.log.label_log import read_demonstrations
 from lira.fusion.log.run_log import ContradictionRecord, RunRecord
+from lira.fusion.methods.base import Method
 from lira.fusion.operator_service import Job
 from lira.hal.errors import ConfigError
 from lira.hal.profile import RobotProfile
@@ -49,6 +51,13 @@ def snapshot(
         return "\n".join(filter(None, [saved, doubtful]))
 
     return write
+
+
+def learn_again(method: Method, log: Path) -> None:
+    """Have a method learn all that is in a log and was not taken back."""
+    for old in read_demonstrations(log):
+        if old.stored:
+            method.remember(Label(old.features, old.action, old.source, method.novice.weight(old.source)))
 
 
 def in_the_log(path: Path, found: Sequence[Contradiction]) -> list[ContradictionRecord]:

@@ -2,14 +2,16 @@
 
 import argparse
 import contextlib
+from collections.abc import Callable
+from functools import partial
 
 from lira.fusion.control import ControlLoop
 from lira.fusion.experts.tasks import task_of
-from lira.fusion.learning.labels import Label
-from lira.fusion.log.label_log import DemonstrationLog, read_demonstrations
+from lira.fusion.log.label_log import DemonstrationLog
 from lira.fusion.log.recorder import Journal
 from lira.fusion.log.run_log import UNPROVEN, RunWriter
-from lira.fusion.operator_service import OperatorService
+from lira.fusion.methods.base import Method
+from lira.fusion.operator_service import Job, OperatorService
 from lira.fusion.service import serve
 from lira.hal.client.remote import RemoteRobot
 from lira.tools.launch.lifetime import saving, stop_or_interrupt
@@ -18,7 +20,7 @@ from lira.tools.live.before import days_before
 from lira.tools.operator.voice import explain
 from lira.tools.recording.beside import recorder_beside
 from lira.tools.runs.build import NewTrainer
-from lira.tools.runs.folder import snapshot
+from lira.tools.runs.folder import learn_again, snapshot
 from lira.tools.runs.names import LABELS, RECORD
 from lira.tools.runs.plan import Plan, build_traced
 from lira.tools.runs.progress import Publish, Say
@@ -31,7 +33,7 @@ def learn_from_person(
     """Learn from whoever takes control with the dead-man, until Ctrl-C; then, or when it fails, save the novice."""
     profile, world = robot.profile, world_of(robot)
     head, folder = plan.head(profile, world), plan.folder
-    notifier = Notifier.from_environment()
+    notifier = Notifier.from_environment()  # before a process is started that would inherit it
     assert folder is not None
     before = days_before(folder / RECORD)
     # The log goes first: if it is damaged, nothing else is touched.
@@ -45,51 +47,64 @@ def learn_from_person(
         novice = method.novice
         with saving(lambda: snapshot(folder, novice, profile, head), say), contextlib.closing(method):
             record.write(head)
-            for old in read_demonstrations(log.path):
-                if old.stored:
-                    method.remember(Label(old.features, old.action, old.source, novice.weight(old.source)))
+            learn_again(method, log.path)
             journal = Journal(keep=log.append, write=record.write, publish=publish)
-            if (newest := before.newest) is not None:
-                journal.ledger.go_on(newest.labels, newest.interventions, newest.calls, before.account)
-            loop = ControlLoop(robot, truth=None if robot.arena is None else robot.state)
-            began_s = robot.now()
-            with stop_or_interrupt() as stop, request_line(robot, args) as line, hand_of(args) as hand:
-                service = OperatorService(
-                    line,
-                    loop,
-                    method,
-                    journal,
-                    say,
-                    restart=restarter(robot, args),
-                    snapshot=lambda: snapshot(folder, novice, profile, head, log.sync),
-                    paused=args.paused,
-                )
-                service.begin()
-                how = PAUSED if args.paused else "hold the dead-man to drive"
-                words = f"{args.method} learns on '{args.name}' with {novice.stored} labels; {how}"
-                say(words)
-                notifier.ready(words)
-                with contextlib.closing(service):
-                    serve(
-                        loop,
-                        method,
-                        journal,
-                        stop,
-                        say,
-                        lambda: novice.training_steps,
-                        operator_service=service,
-                        explain=explain,
-                        layout=args.layout,
-                        is_attended=lambda: hand.holds,
-                        alive=notifier.alive,
-                    )
-                # Nothing is proven here: that takes a session with an end.
-                result = journal.result(
-                    converged=False,
-                    laps=service.episode,
-                    training_steps=novice.training_steps,
-                    simulated_s=robot.now() - began_s,
-                    proof=UNPROVEN,
-                )
-                record.write(result)
+            before.go_on(journal.ledger)
+            job = partial(snapshot, folder, novice, profile, head, log.sync)
+            _lesson(args, robot, method, journal, record, say, job, notifier)
     return 0
+
+
+def _lesson(
+    args: argparse.Namespace,
+    robot: RemoteRobot,
+    method: Method,
+    journal: Journal,
+    record: RunWriter,
+    say: Say,
+    snapshot: Callable[[], Job],
+    notifier: Notifier,
+) -> None:
+    """Serve whoever teaches until Ctrl-C, and sum up."""
+    novice = method.novice
+    loop = ControlLoop(robot, truth=None if robot.arena is None else robot.state)
+    began_s = robot.now()
+    with stop_or_interrupt() as stop, request_line(robot, args) as line, hand_of(args) as hand:
+        service = OperatorService(
+            line,
+            loop,
+            method,
+            journal,
+            say,
+            restart=restarter(robot, args),
+            snapshot=snapshot,
+            paused=args.paused,
+        )
+        service.begin()
+        how = PAUSED if args.paused else "hold the dead-man to drive"
+        words = f"{args.method} learns on '{args.name}' with {novice.stored} labels; {how}"
+        say(words)
+        notifier.ready(words)
+        with contextlib.closing(service):
+            serve(
+                loop,
+                method,
+                journal,
+                stop,
+                say,
+                lambda: novice.training_steps,
+                operator_service=service,
+                explain=explain,
+                layout=args.layout,
+                is_attended=lambda: hand.holds,
+                alive=notifier.alive,
+            )
+        # Nothing is proven here: that takes a session with an end.
+        result = journal.result(
+            converged=False,
+            laps=service.episode,
+            training_steps=novice.training_steps,
+            simulated_s=robot.now() - began_s,
+            proof=UNPROVEN,
+        )
+        record.write(result)
