@@ -27,6 +27,9 @@ class DrivingNet(ABC):
         self._joined = np.empty(sum(architecture.trunk_sizes), np.float32)
         self.load_weights(weights)
 
+    def __reduce__(self) -> tuple[type, tuple[Architecture, Weights]]:
+        return type(self), (self.architecture, self._weights)  # what it has prepared belongs to a process
+
     @property
     def kind(self) -> str:
         """The sensor whose expert it is, "fusion" or "kernel"."""

@@ -162,7 +162,9 @@ class Learner:
         if self._trunks:
             for parameter in self._trunks:
                 parameter.grad = None
-            features.backward(slope[0] @ self._heads.weights[0][0].T)  # type: ignore[no-untyped-call]
+            # Not `features.backward(below)`: PyTorch would load its symbolic shapes, which takes half a second.
+            below = slope[0] @ self._heads.weights[0][0].T
+            (features * below).sum().backward()  # type: ignore[no-untyped-call]
         if self._members:
             times = targets[:, 3:].T.unsqueeze(2)
             self._doubters.descend(seen, actions, times * weights)

@@ -41,6 +41,9 @@ class LearningSettings(Table, frozen=True):
 class Trainer(Protocol):
     """Where training happens: in this process or in one of its own."""
 
+    network: DrivingNet
+    """Drives as the network does before any training."""
+
     def add(self, label: Label) -> None:
         """Hand over one label."""
 

@@ -10,6 +10,8 @@ import multiprocessing
 import os
 import pickle
 import signal
+from collections.abc import Callable
+from dataclasses import dataclass
 from multiprocessing import resource_tracker
 from multiprocessing.connection import Connection
 from multiprocessing.context import SpawnContext
@@ -17,9 +19,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from lira.fusion.inference.architecture import Weights
+from lira.fusion.inference.architecture import Architecture, Weights
+from lira.fusion.inference.build import driving
+from lira.fusion.inference.networks import DrivingNet
 from lira.fusion.inference.threads import one_thread
 from lira.fusion.learning.labels import Label
+from lira.fusion.learning.novice import Trainer
 from lira.fusion.preprocess import Features
 from lira.hal.errors import LiraError
 from lira.hal.messages import FloatArray
@@ -33,11 +38,26 @@ SMALL = {"image": (32, 32), "scan": (8,)}  # a network to warm up with
 _EARLY_S = 1e-9  # simulated time is a sum of periods and may come out this much short
 
 
-class InlineTrainer:
-    """Trains at `start`, which takes as long as a training step does."""
+@dataclass(frozen=True, slots=True)
+class Beginning:
+    """A network before it learns: what it is made of, and how to make its learner, which is up to whoever trains it.
 
-    def __init__(self, learner: "Learner", *, adopt_after_s: float = 0.0) -> None:
-        self._learner = learner
+    `learner` can be pickled. PyTorch is loaded where it is called, and nowhere else.
+    """
+
+    architecture: Architecture
+    learner: Callable[[], "Learner"]
+
+
+NewTrainer = Callable[[Beginning], Trainer]
+
+
+class InlineTrainer:
+    """Trains at `start`, which takes as long as a training step does. `network` drives as it does before the first."""
+
+    def __init__(self, beginning: Beginning, *, adopt_after_s: float = 0.0) -> None:
+        self._learner = beginning.learner()
+        self.network: DrivingNet = driving(beginning.architecture, self._learner.weights())
         self._adopt_after_s = adopt_after_s
         self._weights: Weights | None = None
         self._due_s = 0.0
@@ -71,19 +91,19 @@ class InlineTrainer:
 class ProcessTrainer:
     """Trains in a process of its own, on one thread and with low priority.
 
-    Takes over the learner with all that it holds. Returns once the process is ready, after a few seconds.
+    Returns once the process is ready, after a few seconds. `network` drives as it does before the first training step.
     """
 
-    def __init__(self, learner: "Learner", *, adopt_after_s: float | None = None) -> None:
+    def __init__(self, beginning: Beginning, *, adopt_after_s: float | None = None) -> None:
         self._adopt_after_s = adopt_after_s
         self._due_s = 0.0
         self._held: list[Label] = []  # while a step runs nobody reads the pipe
         self.pending = False
         context = multiprocessing.get_context("spawn")
         self._pipe, theirs = context.Pipe()
-        self._shared = _SharedWeights(context, learner.weights())
-        # Pickled here: multiprocessing would share the tensors' memory between the processes.
-        arguments = (pickle.dumps(learner), theirs, self._shared)
+        self._shared = _SharedWeights(context, beginning.architecture)
+        # Pickled here: multiprocessing would share the memory of tensors between the processes.
+        arguments = (pickle.dumps(beginning.learner), theirs, self._shared)
         self._process = context.Process(target=_serve, args=arguments, name="lira-trainer", daemon=True)
         # Ctrl-C reaches every process of the terminal; the trainer's end is its parent's to decide.
         resource_tracker.ensure_running()  # which the first start does else, and that unblocks the signal
@@ -94,6 +114,7 @@ class ProcessTrainer:
             signal.pthread_sigmask(signal.SIG_SETMASK, before)
         theirs.close()
         self._receive()
+        self.network: DrivingNet = driving(beginning.architecture, self._shared.read())
 
     @property
     def pid(self) -> int:
@@ -141,7 +162,7 @@ class ProcessTrainer:
             return
 
     def _receive(self) -> None:
-        """Wait for word from the process: that it is ready, or that the weights are there."""
+        """Wait for word from the process: that there are weights, at first those that it begins with."""
         try:
             self._pipe.recv()
         except (EOFError, ConnectionResetError) as error:
@@ -155,9 +176,9 @@ class ProcessTrainer:
 class _SharedWeights:
     """Weights in memory that two processes share: through the pipe, megabytes would keep the control loop waiting."""
 
-    def __init__(self, context: SpawnContext, like: Weights) -> None:
-        self._shapes = {name: array.shape for name, array in like.items()}
-        self._memory = context.RawArray("f", sum(array.size for array in like.values()))
+    def __init__(self, context: SpawnContext, architecture: Architecture) -> None:
+        self._shapes = architecture.weights
+        self._memory = context.RawArray("f", sum(map(math.prod, self._shapes.values())))
 
     def write(self, weights: Weights) -> None:
         np.concatenate([weights[name].ravel() for name in self._shapes], out=self._flat())
@@ -176,9 +197,10 @@ def _serve(pickled: bytes, pipe: Connection, shared: _SharedWeights) -> None:
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C reaches the whole group; the owner ends this process
     os.nice(NICENESS)
     one_thread()
+    learner: Learner = pickle.loads(pickled)()
     _warm_up()
-    learner: Learner = pickle.loads(pickled)
     try:
+        shared.write(learner.weights())
         pipe.send(None)  # ready
         while True:
             label = pipe.recv()
@@ -197,7 +219,7 @@ def _warm_up() -> None:
     from lira.fusion.learning.learner import Learner
     from lira.fusion.policies.networks import FusionNet
 
-    learner = Learner(FusionNet(SMALL, filters=4), seed=0, frozen_trunks=False)
+    learner = Learner(FusionNet(SMALL, filters=4), updates=1, seed=0, frozen_trunks=False)
     nothing = Features(**{name: np.zeros(shape, np.float32) for name, shape in SMALL.items()})
     learner.add(Label(nothing, (0.0, 0.0), "none"))
     learner.train_step()

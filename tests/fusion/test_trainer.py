@@ -3,6 +3,7 @@ import signal
 import subprocess
 import sys
 import time
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -12,7 +13,7 @@ from nets import lidar_net
 from test_learner import labels
 
 from lira.fusion.learning.learner import Learner
-from lira.fusion.learning.trainer import InlineTrainer, ProcessTrainer
+from lira.fusion.learning.trainer import Beginning, InlineTrainer, ProcessTrainer
 from lira.hal.errors import LiraError
 
 WAIT_S = 60.0  # for what is certain to come; only a hang takes that long
@@ -26,12 +27,13 @@ def _one_thread():
     torch.set_num_threads(threads)
 
 
-def learner(updates: int = 50) -> Learner:
-    return Learner(lidar_net(101), seed=1, frozen_trunks=False, updates=updates)
+def beginning(updates: int = 50) -> Beginning:
+    network = lidar_net(101)
+    return Beginning(network.architecture, partial(Learner, network, seed=1, frozen_trunks=False, updates=updates))
 
 
 def process_trainer(**settings):
-    return ProcessTrainer(learner(), **settings)
+    return ProcessTrainer(beginning(), **settings)
 
 
 @pytest.fixture(scope="module")
@@ -68,7 +70,7 @@ def lockstep(trainer, steps: int = 24) -> dict[int, dict[str, np.ndarray]]:
 
 
 def test_both_trainers_adopt_the_same_weights_at_the_same_steps():
-    inline = lockstep(InlineTrainer(learner(), adopt_after_s=0.6))
+    inline = lockstep(InlineTrainer(beginning(), adopt_after_s=0.6))
     process = lockstep(process_trainer(adopt_after_s=0.6))
     assert list(inline) == list(process) == [10, 18]
     for k, weights in inline.items():
@@ -77,7 +79,7 @@ def test_both_trainers_adopt_the_same_weights_at_the_same_steps():
 
 
 def test_inline_training_is_ready_at_once():
-    trainer = InlineTrainer(learner())
+    trainer = InlineTrainer(beginning())
     trainer.add(labels(1)[0])
     assert trainer.poll(0.0) is None
     trainer.start(5.0)
@@ -130,7 +132,7 @@ def test_a_trainer_that_dies_is_reported_at_the_next_poll(adopt_after_s):
 
 
 def test_closing_in_the_middle_of_a_long_training_step_is_bounded():
-    trainer = ProcessTrainer(learner(updates=10**6))
+    trainer = ProcessTrainer(beginning(updates=10**6))
     trainer.add(labels(1)[0])
     trainer.start(0.0)
     began = time.monotonic()
@@ -141,10 +143,12 @@ def test_closing_in_the_middle_of_a_long_training_step_is_bounded():
 
 
 OWNER = """
-import os, signal, threading, time
-from lira.fusion.learning.learner import Learner
-from lira.fusion.policies.networks import ExpertNet
+import os, signal, sys, threading, time
+from lira.fusion.learning.novice import LearningSettings
 from lira.fusion.learning.trainer import ProcessTrainer
+from lira.hal.profile import load_profile
+from lira.tools.runs.build import load_pair
+from lira.tools.runs.network_novice import network_novice
 
 signal.signal(signal.SIGINT, lambda *_: None)
 ready = threading.Event()
@@ -154,9 +158,11 @@ def press():
         os.killpg(0, signal.SIGINT)
 
 threading.Thread(target=press).start()
-trainer = ProcessTrainer(Learner(ExpertNet("scan", (101,)), seed=0, frozen_trunks=False))
+experts = [network for network, _ in load_pair(load_profile("thesis-sim"))]
+how = {"frozen": True, "mirrored": False, "ensemble": 0}
+novice = network_novice(experts, LearningSettings(), ProcessTrainer, 0, **how)
 ready.set()
-print(trainer.pid, flush=True)
+print(novice._trainer.pid, "torch" in sys.modules, flush=True)
 time.sleep(600)
 """
 
@@ -169,10 +175,12 @@ def is_running(pid: int) -> bool:
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="looks into /proc")
-def test_the_process_does_not_hear_ctrl_c_while_it_starts_and_goes_when_its_parent_is_killed():
+def test_the_process_does_not_hear_ctrl_c_while_it_starts_goes_with_its_parent_and_alone_loads_torch():
     words, pipe = [sys.executable, "-c", OWNER], subprocess.PIPE
     owner = subprocess.Popen(words, stdout=pipe, stderr=pipe, text=True, start_new_session=True)
-    pid = int(owner.stdout.readline())
+    pid, loaded = owner.stdout.readline().split()
+    assert loaded == "False"
+    pid = int(pid)
     assert is_running(pid)
     owner.kill()
     assert owner.communicate(timeout=WAIT_S)[1] == ""

@@ -12,6 +12,7 @@ multiplications (Winograd's F(4, 3) along rows, no copies along columns), a step
 
 import statistics
 import time
+from functools import partial
 from typing import Protocol
 
 import numpy as np
@@ -21,7 +22,7 @@ from torch import Tensor, nn
 from lira.fusion.inference.threads import one_thread
 from lira.fusion.learning.labels import Label
 from lira.fusion.learning.learner import Learner
-from lira.fusion.learning.trainer import ProcessTrainer
+from lira.fusion.learning.trainer import Beginning, ProcessTrainer
 from lira.fusion.policies.networks import ExpertNet, FusionNet
 from lira.fusion.preprocess import Features, Shape
 from lira.hal.messages import Driver
@@ -71,7 +72,7 @@ def run() -> list[Row]:
                 "reference_s": median["plain"],
                 "speedup": median["plain"] / median[trunks],
                 **({"keras_speedup": median["keras"] / median[trunks]} if "keras" in median else {}),
-                **control_loop(learners[trunks], filters, labels),
+                **control_loop(filters, trunks, labels),
             }
             for trunks in TRUNKS
         ]
@@ -95,10 +96,16 @@ def shapes(filters: int) -> dict[str, Shape]:
     return {"image": (32, 32), "scan": (BINS[filters],)}
 
 
+def beginning(filters: int, trunks: str) -> Beginning:
+    """A novice that has learned nothing."""
+    network = FusionNet(shapes(filters), filters)
+    learner = partial(Learner, network, batch=BATCH, updates=UPDATES, seed=0, frozen_trunks=trunks == "frozen")
+    return Beginning(network.architecture, learner)
+
+
 def make_learner(filters: int, trunks: str, labels: list[Label]) -> Learner:
     """Prepare a learner that knows the labels."""
-    network = FusionNet(shapes(filters), filters)
-    learner = Learner(network, batch=BATCH, updates=UPDATES, seed=0, frozen_trunks=trunks == "frozen")
+    learner = beginning(filters, trunks).learner()
     for label in labels:
         learner.add(label)
     return learner
@@ -154,13 +161,13 @@ class PlainLearner:
             self._adam.step()
 
 
-def control_loop(learner: Learner, filters: int, labels: list[Label]) -> Row:
+def control_loop(filters: int, trunks: str, labels: list[Label]) -> Row:
     """Decide at 20 Hz with all three networks while a process trains; a miss is a decision later than its period."""
-    policies = [
-        *(ExpertNet(*seen, filters).driving() for seen in shapes(filters).items()),
-        FusionNet(shapes(filters), filters).driving(),
-    ]
-    trainer = ProcessTrainer(learner)
+    experts = [ExpertNet(*seen, filters).driving() for seen in shapes(filters).items()]
+    trainer = ProcessTrainer(beginning(filters, trunks))
+    for label in labels:
+        trainer.add(label)
+    policies = [*experts, trainer.network]
     took_s: list[float] = []
     steps = 0
     try:
@@ -170,7 +177,7 @@ def control_loop(learner: Learner, filters: int, labels: list[Label]) -> Row:
             time.sleep(max(0.0, next_s - time.monotonic()))
             weights = trainer.poll(next_s)
             if weights is not None:
-                policies[2].load_weights(weights)
+                trainer.network.load_weights(weights)
                 steps += 1
             label = labels[len(took_s) % len(labels)]
             for policy in policies:

@@ -7,13 +7,12 @@ where it was.
 
 import math
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
 
 from lira.fusion.inference.architecture import Weights
 from lira.fusion.inference.threads import one_thread
 from lira.fusion.learning.labels import Label
 from lira.fusion.learning.learned_policy import LearnedPolicy
-from lira.fusion.learning.trainer import InlineTrainer
+from lira.fusion.learning.trainer import Beginning, InlineTrainer
 from lira.fusion.log.method_trace import Decided, Learned, State, restored
 from lira.fusion.methods.base import Chooser, Method, Proposal
 from lira.fusion.preprocess import Features
@@ -24,17 +23,14 @@ from lira.tools.inquiry.trace import OUTCOMES, Trace, outcome_of
 from lira.tools.runs.build import build_method
 from lira.tools.runs.plan import Recipe
 
-if TYPE_CHECKING:
-    from lira.fusion.learning.learner import Learner
-
 MOST_DIFFERENCES = 20
 
 
 class ToldTrainer(InlineTrainer):
     """Hands its weights out when it is told that this is when they were adopted."""
 
-    def __init__(self, learner: "Learner", *, adopt_after_s: float) -> None:
-        super().__init__(learner, adopt_after_s=adopt_after_s)
+    def __init__(self, beginning: Beginning, *, adopt_after_s: float) -> None:
+        super().__init__(beginning, adopt_after_s=adopt_after_s)
         self.follows = False  # until then, as on a twin: so long after the start of the training step
         self.told = False
 
@@ -120,8 +116,8 @@ class _Run:
         self._again = Again(trace)
         self._time_s = 0.0
 
-    def _trainer(self, learner: "Learner") -> ToldTrainer:
-        trainer = ToldTrainer(learner, adopt_after_s=self._profile.period_s)
+    def _trainer(self, beginning: Beginning) -> ToldTrainer:
+        trainer = ToldTrainer(beginning, adopt_after_s=self._profile.period_s)
         self._trainers.append(trainer)
         return trainer
 

@@ -5,6 +5,7 @@ from pathlib import Path
 from typing import Self
 
 from lira.fusion.experts.tasks import task_of
+from lira.fusion.learning.trainer import NewTrainer
 from lira.fusion.log.counts import Ledger
 from lira.fusion.log.label_edit import correct, last_intervention, read_heads
 from lira.fusion.log.label_log import Demonstration, DemonstrationLog
@@ -14,7 +15,6 @@ from lira.fusion.operator_service import Job
 from lira.hal.messages import Driver
 from lira.hal.profile import RobotProfile
 from lira.tools.live.before import days_before
-from lira.tools.runs.build import NewTrainer
 from lira.tools.runs.folder import learn_again, snapshot
 from lira.tools.runs.names import LABELS, RECORD
 from lira.tools.runs.plan import Plan, build_traced

@@ -1,7 +1,6 @@
 """Puts learners together: which networks, which experts, which method, which teacher, which lap."""
 
 from collections.abc import Callable, Sequence
-from typing import TYPE_CHECKING
 
 import msgspec
 
@@ -12,7 +11,8 @@ from lira.fusion.inference.architecture import FUSION, KERNEL
 from lira.fusion.inference.kernel_net import KernelNet
 from lira.fusion.inference.networks import DrivingNet
 from lira.fusion.learning.kernel_novice import KernelNovice
-from lira.fusion.learning.novice import Novice, Trainer, used_turn
+from lira.fusion.learning.novice import Novice, used_turn
+from lira.fusion.learning.trainer import NewTrainer
 from lira.fusion.methods.base import Expert, Method, Policy
 from lira.fusion.methods.context import Context, Trunks
 from lira.fusion.methods.presets import Preset
@@ -22,12 +22,8 @@ from lira.hal.messages import Driver
 from lira.hal.profile import RobotProfile
 from lira.sim_backend.foresight import Foresight
 from lira.sim_backend.world import World
+from lira.tools.runs.network_novice import network_novice
 from lira.tools.runs.warm_start import warm_up
-
-if TYPE_CHECKING:
-    from lira.fusion.learning.learner import Learner
-
-NewTrainer = Callable[["Learner"], Trainer]
 
 
 def build_method(
@@ -59,8 +55,6 @@ def build_method(
             learning = msgspec.structs.replace(learning, turn=used_turn(profile.base))
             novice = KernelNovice(KernelNet.from_experts(sees), learning, preset.kernel, mirrored=preset.mirrored)
         else:
-            from lira.tools.runs.network_novice import network_novice  # torch, which a regression does without
-
             frozen = (trunks or preset.trunks) == "frozen"
             novice = network_novice(
                 sees, learning, trainer, seed, frozen=frozen, mirrored=preset.mirrored, ensemble=ensemble

@@ -2,6 +2,7 @@
 
 from contextlib import closing
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
 import msgspec
@@ -15,7 +16,7 @@ from lira.fusion.inference.networks import DrivingNet
 from lira.fusion.inference.threads import one_thread
 from lira.fusion.learning.learner import Learner
 from lira.fusion.learning.novice import LearningSettings, NetworkNovice
-from lira.fusion.learning.trainer import InlineTrainer
+from lira.fusion.learning.trainer import Beginning, InlineTrainer
 from lira.fusion.log.recorder import Journal
 from lira.fusion.methods.base import Alone
 from lira.fusion.methods.rivals.hg_dagger import HgDagger
@@ -48,8 +49,9 @@ def train_expert(kind: str, task: str, profile: RobotProfile, seed: int, path: P
     sees = next(row for row in modalities_of(profile) if row.sensor == kind)
     profile = seeing_only(sees.name, with_small_camera(profile))
     network = ExpertNet(sees.name, sees.shape(profile), profile.features.filters, seed=seed)
-    trainer = InlineTrainer(Learner(network, seed=seed, frozen_trunks=False, mirrored=course.mirrored))
-    novice = NetworkNovice(network.driving(), trainer, LearningSettings(labels_per_step=course.labels_per_step))
+    learner = partial(Learner, network, seed=seed, frozen_trunks=False, mirrored=course.mirrored)
+    trainer = InlineTrainer(Beginning(network.architecture, learner))
+    novice = NetworkNovice(trainer.network, trainer, LearningSettings(labels_per_step=course.labels_per_step))
     with (
         simulate(world, profile, seed=seed, renderer=quickest(world)) as robot,
         closing(ScriptedTeacher(Foresight(profile, world), profile, course.teacher, seed)) as teacher,

@@ -7,6 +7,7 @@ from typing import Self
 
 import msgspec
 
+from lira.fusion.learning.trainer import NewTrainer
 from lira.fusion.log.method_trace import traced
 from lira.fusion.log.run_log import RunRecord
 from lira.fusion.methods.base import Expert, Method, Policy
@@ -14,7 +15,7 @@ from lira.fusion.methods.context import Context
 from lira.fusion.methods.presets import Preset
 from lira.hal.profile import RobotProfile
 from lira.tools.cli import version
-from lira.tools.runs.build import NewTrainer, build_method
+from lira.tools.runs.build import build_method
 from lira.tools.runs.progress import Publish
 
 

@@ -5,6 +5,7 @@ from contextlib import ExitStack, closing
 from dataclasses import dataclass
 
 from lira.fusion.experts.tasks import task_of
+from lira.fusion.learning.trainer import NewTrainer
 from lira.fusion.log.label_log import Demonstration, DemonstrationLog
 from lira.fusion.log.recorder import Journal
 from lira.fusion.log.run_log import LapRecord, Record, ResultRecord, RunWriter
@@ -14,7 +15,7 @@ from lira.hal.messages import Phase
 from lira.hal.port import Arena, Robot
 from lira.sim_backend.world import World
 from lira.tools.launch.lifetime import saving
-from lira.tools.runs.build import NewTrainer, teacher
+from lira.tools.runs.build import teacher
 from lira.tools.runs.course import Course, run_course
 from lira.tools.runs.folder import check_fresh, snapshot
 from lira.tools.runs.names import LABELS, RECORD

@@ -7,6 +7,7 @@ from functools import partial
 
 from lira.fusion.control import ControlLoop
 from lira.fusion.experts.tasks import task_of
+from lira.fusion.learning.trainer import NewTrainer
 from lira.fusion.log.label_log import DemonstrationLog
 from lira.fusion.log.recorder import Journal
 from lira.fusion.log.run_log import UNPROVEN, RunWriter
@@ -19,7 +20,6 @@ from lira.tools.launch.notify import Notifier
 from lira.tools.live.before import days_before
 from lira.tools.operator.voice import explain
 from lira.tools.recording.beside import recorder_beside
-from lira.tools.runs.build import NewTrainer
 from lira.tools.runs.folder import learn_again, snapshot
 from lira.tools.runs.names import LABELS, RECORD
 from lira.tools.runs.plan import Plan, build_traced
