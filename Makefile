@@ -4,7 +4,6 @@ VENV := .venv
 BIN := $(VENV)/bin
 SEEDS := 10
 WORKERS := 2
-TEST_WORKERS := 5
 EXPERTS := $(foreach task,line eight passage garden corridor,camera:--task:$(task)) \
   $(foreach task,line passage garden,lidar:--task:$(task)) depth:--task:table-top
 BENCHES := twin lockstep latency train preprocess step log drivers takeover web
@@ -37,11 +36,8 @@ foreign: ## ROS 2, a peer of rmw_zenoh and Foxglove's decoders, for tests agains
 demo: setup ## teach a robot in the twin, from start to report
 	$(BIN)/lira demo
 
-# Most tests wait for processes, so more run beside each other than there are processors. Those of a file stay together,
-# and share what it starts.
 test: setup ## every test: most beside each other, then those that need the machine for themselves
-	$(BIN)/python -m pytest --crowd --numprocesses $(TEST_WORKERS) --dist loadfile --no-loadscope-reorder
-	$(BIN)/python -m pytest --alone
+	$(BIN)/python tests/suite.py
 
 test-long: setup ## a scripted person teaches to a pass in real time, by pad and by page: ten minutes or more, alone
 	LIRA_LONG=1 $(BIN)/python -m pytest tests/tools/test_taught_by_hand.py

@@ -1,14 +1,16 @@
-"""How the suite is run: its kinds, what runs beside others and what alone, and what a skip means in CI.
+"""How the suite is run: its parts, and what a skip means in CI.
 
-With `--crowd` the suite runs without the tests that are marked `alone`, on several workers. A test of processes that
-fails there may have lacked the time that it needs: it is left open, and has to pass with `--alone`, which runs what is
-marked and what was left open, one after the other. A few at most, and none of another kind: that is a failure at once.
+`--part computing` is what only computes, `--part waiting` what starts processes and mostly waits for them, each on
+several workers (`suite.py`). A test that fails waiting may have lacked the time that it needs: it is left open, and has
+to pass with `--part alone`, which runs that and what is marked `alone`, one after the other. More than a few are a
+failure at once.
 
 In CI (`CI=true`) a skipped test fails unless its reason is expected: a suite that skips itself proves nothing.
 Property tests try the same examples in every run; `pytest --hypothesis-profile=explore` looks for new ones.
 """
 
 import gc
+import hashlib
 import os
 import signal
 import sys
@@ -40,15 +42,15 @@ EXPECTED_SKIPS = {
     *NOT_INSTALLED,
     TAKES_LONG,
 }
-OPEN = "lira/open"  # in pytest's cache: what failed in the crowd
+PARTS = ("computing", "waiting", "alone")
+OPEN = "lira/open"  # in pytest's cache: what failed waiting
 MOST_OPEN = 40
-_failed: dict[str, bool] = {}  # whether it may be left open, by the name of what failed
+_failed: set[str] = set()
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
-    """Declare the two halves of a run."""
-    parser.addoption("--crowd", action="store_true", help="what can run beside others, on several workers")
-    parser.addoption("--alone", action="store_true", help="what --crowd leaves out, and what it left open")
+    """Declare the parts of a run."""
+    parser.addoption("--part", choices=PARTS, help="only what computes, what waits for processes, or what runs alone")
 
 
 def pytest_configure(config: pytest.Config) -> None:
@@ -61,9 +63,12 @@ def pytest_ignore_collect(collection_path: Path, config: pytest.Config) -> bool 
     """Do not even import what has no test of this run: all imports together take longer than the unit tests."""
     if not collection_path.match("test_*.py"):
         return None
-    if config.getoption("markexpr") == "unit" and kind_of(collection_path) != "unit":
+    kind, part = kind_of(collection_path), config.getoption("part")
+    if config.getoption("markexpr") == "unit" and kind != "unit":
         return True
-    if config.getoption("alone"):
+    if part in ("computing", "waiting") and (kind == "processes") != (part == "waiting"):
+        return True
+    if part == "alone":
         inside = f"{collection_path.relative_to(config.rootpath).as_posix()}::"
         left_open = any(name.startswith(inside) for name in config.cache.get(OPEN, []))
         return None if left_open or "mark.alone" in collection_path.read_text(encoding="utf-8") else True
@@ -71,18 +76,23 @@ def pytest_ignore_collect(collection_path: Path, config: pytest.Config) -> bool 
 
 
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
-    """Mark every test by its kind (`kinds.py`), and choose those of this half of the run.
+    """Mark every test by its kind (`kinds.py`), and choose those of this part of the run.
 
-    A crowd begins with the files that mostly wait, the slowest first: what is left in the end is short.
+    Where several run beside each other the slow files come first, so that what is left in the end is short; the others
+    follow in an order of chance, always the same: those of one folder would all wait at a time.
     """
     for item in items:
         item.add_marker(kind_of(item.path))
-    if config.getoption("crowd"):
-        items[:] = [item for item in items if item.get_closest_marker("alone") is None]
-        items.sort(key=lambda item: (item.get_closest_marker("slow") is None, kind_of(item.path) != "processes"))
-    elif config.getoption("alone"):
+    if config.getoption("part") == "alone":
         left_open = config.cache.get(OPEN, [])
         items[:] = [item for item in items if item.get_closest_marker("alone") or item.nodeid in left_open]
+    elif config.getoption("part"):
+        items[:] = [item for item in items if item.get_closest_marker("alone") is None]
+        items.sort(key=lambda item: (item.get_closest_marker("slow") is None, _chance(item.location[0])))
+
+
+def _chance(file: str) -> str:
+    return hashlib.sha1(file.encode(), usedforsecurity=False).hexdigest()
 
 
 @pytest.hookimpl(wrapper=True)
@@ -99,17 +109,17 @@ def pytest_collection() -> Generator[None, object, object]:
 def pytest_runtest_logreport(report: pytest.TestReport) -> None:
     """Note what failed."""
     if report.failed:
-        _failed[report.nodeid] = "processes" in report.keywords
+        _failed.add(report.nodeid)
 
 
 @pytest.hookimpl(trylast=True)
 def pytest_sessionfinish(session: pytest.Session) -> None:
-    """Leave open what failed in a crowd."""
+    """Leave open what failed waiting."""
     config = session.config
-    if not config.getoption("crowd") or hasattr(config, "workerinput"):
+    if config.getoption("part") != "waiting" or hasattr(config, "workerinput"):
         return
     config.cache.set(OPEN, sorted(_failed))
-    if session.exitstatus == pytest.ExitCode.TESTS_FAILED and all(_failed.values()) and len(_failed) <= MOST_OPEN:
+    if session.exitstatus == pytest.ExitCode.TESTS_FAILED and len(_failed) <= MOST_OPEN:
         session.exitstatus = pytest.ExitCode.OK
 
 

@@ -9,6 +9,8 @@ from lira.hal.errors import LiraError
 from lira.hal.messages import STOP, Applied, Command, Episode, Reason, Source, Twist, is_neutral
 from lira.hal.port import Arena, Robot
 
+pytestmark = pytest.mark.slow
+
 STEPS = 60  # more than any robot needs to do as told, over any bus
 
 

@@ -16,6 +16,8 @@ sys.path.insert(0, str(Path(__file__).parents[1] / "robot"))
 
 from ros2_peer import Peer
 
+pytestmark = pytest.mark.slow
+
 OPEN = "open them with: lira robot"
 READY_S = 90.0
 END_S = 10.0  # 3 s are promised; the rest is for a busy machine

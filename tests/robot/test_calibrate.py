@@ -24,6 +24,8 @@ from lira.tools.cli import EXIT_SIGNAL, main
 from lira.tools.launch.processes import ChildProcess, lira_command
 from lira.tools.verbs.robots import calibrate
 
+pytestmark = pytest.mark.slow
+
 WALLS_M = (3.0, 1.7, -1.0, -1.3)  # ahead, left, behind, right of where it starts
 NO_FIELD = ["--profile", "thesis-sim"]  # whose robot may be driven without a lidar
 ATTEMPTS = 8

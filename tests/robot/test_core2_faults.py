@@ -12,6 +12,8 @@ from lira.robot.settings import BaseSettings, Settings
 from lira.sim_backend.emulators.core2 import WATCHDOG_S, Core2Unit, Firmware
 from lira.sim_backend.emulators.wire import Wire
 
+pytestmark = pytest.mark.slow
+
 GO = Twist(0.2, 0.0)
 RAMP_M_S2 = 1.5
 BRAKING_M = GO.linear_m_s**2 / (2 * RAMP_M_S2)

@@ -30,6 +30,8 @@ from lira.sim_backend.emulators.rplidar_models import (
 from lira.sim_backend.emulators.rplidar_streams import seal
 from lira.sim_backend.emulators.wire import Wire
 
+pytestmark = pytest.mark.slow
+
 LIDAR = load_profile("rosbot2").lidar
 SETTINGS = LidarSettings(spin_up_s=0.0)
 LAST_WORDS_S = 1.0  # that a driver is done says not that all is through the wire

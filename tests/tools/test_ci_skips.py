@@ -1,4 +1,4 @@
-"""The suite judges itself: unexpected skips fail in CI, and what fails in a crowd has to pass alone."""
+"""The suite judges itself: unexpected skips fail in CI, and what fails beside others has to pass alone."""
 
 import os
 import shutil
@@ -49,14 +49,15 @@ def test_an_expected_skip_and_an_expected_failure_pass_in_ci(tmp_path):
     assert done.returncode == 0, done.stdout
 
 
-def test_what_fails_in_a_crowd_has_to_pass_alone_if_it_starts_processes(tmp_path):
+def test_what_fails_waiting_has_to_pass_alone(tmp_path):
     write(tmp_path, {"test_it.py": OF_PROCESSES + FAILS, "test_other.py": ALONE})
-    crowd = run_pytest(tmp_path, "--crowd")
-    assert (crowd.returncode, "1 failed" in crowd.stdout, "passed" in crowd.stdout) == (0, True, False), crowd.stdout
-    alone = run_pytest(tmp_path, "--alone")
+    first = run_pytest(tmp_path, "--part", "waiting")
+    assert (first.returncode, "1 failed" in first.stdout, "passed" in first.stdout) == (0, True, False), first.stdout
+    alone = run_pytest(tmp_path, "--part", "alone")
     assert (alone.returncode, "1 failed, 1 passed" in alone.stdout) == (1, True), alone.stdout
 
 
-def test_what_fails_in_a_crowd_and_starts_nothing_has_failed(tmp_path):
-    write(tmp_path, {"test_it.py": FAILS})
-    assert run_pytest(tmp_path, "--crowd").returncode == 1
+def test_what_fails_computing_has_failed(tmp_path):
+    write(tmp_path, {"test_it.py": FAILS, "test_other.py": OF_PROCESSES + FAILS})
+    done = run_pytest(tmp_path, "--part", "computing")
+    assert (done.returncode, "1 failed" in done.stdout) == (1, True), done.stdout

@@ -21,6 +21,8 @@ from lira.hal.server.server import HalServer
 from lira.hal.testing import NullRobot
 from lira.tools.launch.processes import ChildProcess, free_port, lira_command
 
+pytestmark = pytest.mark.slow
+
 if library() is None:
     pytest.skip("needs libumockdev (Debian package umockdev)", allow_module_level=True)
 

@@ -28,6 +28,8 @@ from lira.tools.parity.script import motions
 from lira.tools.parity.sight import match_scans
 from lira.tools.verbs.robots import parity
 
+pytestmark = pytest.mark.slow
+
 PROFILE = load_profile("rosbot2")
 WALLS = (3.0, -1.5, 2.0, -1.2)  # of a room, seen from the robot: ahead, behind, left, right
 

@@ -16,7 +16,7 @@ from selenium.webdriver.common.action_chains import ActionChains  # noqa: E402
 from selenium.webdriver.common.by import By  # noqa: E402
 from selenium.webdriver.common.keys import Keys  # noqa: E402
 
-pytestmark = needs_browser
+pytestmark = [pytest.mark.slow, needs_browser]
 PRESSES, NOTICED_S = 8, 6.0
 HELD_S = 1.3  # a button that cannot be taken back is held for a second
 
