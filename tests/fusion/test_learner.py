@@ -8,7 +8,7 @@ from lira.fusion.learning.learner import Label, Learner
 from lira.fusion.policies.networks import FusionNet
 from lira.fusion.preprocess import Features
 
-SIZES = (101, 16)
+SIZES = (101, 8)
 
 
 @pytest.fixture(autouse=True)
@@ -58,7 +58,7 @@ def test_training_learns_and_leaves_the_given_network_alone(frozen):
     assert error(network, fresh) < 0.1 * before
 
 
-@pytest.mark.parametrize(("network", "k"), [(lidar_net(101), 0), (camera_net(16), 1)])
+@pytest.mark.parametrize(("network", "k"), [(lidar_net(101), 0), (camera_net(SIZES[1]), 1)])
 def test_experts_learn_from_their_own_sensor(network, k):
     fresh = labels(50, seed=9)
     network.load_weights(trained(network, steps=4).weights())
@@ -88,7 +88,7 @@ def test_the_losses_fall_and_are_means_of_the_squared_error():
 
 
 def test_frozen_trunks_stay_and_training_the_head_on_kept_features_equals_the_full_forward():
-    network = FusionNet.from_experts([camera_net(16, seed=4), lidar_net(101, seed=5)])
+    network = FusionNet.from_experts([camera_net(SIZES[1], seed=4), lidar_net(101, seed=5)])
     before, made = network.weights(), labels(40)
     weights = trained(network, frozen=True, steps=1, made=made).weights()
     for name, value in weights.items():

@@ -82,6 +82,7 @@ class Selection:
             "randomised" if self.randomised else None,
             self.shift,
             f"more{self.more}" if self.more else None,
+            "ask" if "ask" in self.ways else None,  # which takes as long as all else together
         )
         return "".join(f"-{part}" for part in parts if part)
 

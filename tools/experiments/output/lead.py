@@ -12,6 +12,7 @@ from lira.tools.experiments.output.markdown import table
 from lira.tools.experiments.output.summary import Summary
 
 LED_BY = "unseen"
+ALL_WAYS, TAUGHT_ON = f"{LED_BY}-ask", f"{LED_BY}-more5"  # the same place, with more asked of fewer seeds
 PARTS = "ablation"
 FIRST = 6  # methods, of a table that is not the main one: the page is to stay short
 PICTURE = "docs/results/unseen-human_labels.svg"
@@ -42,6 +43,13 @@ DEPLOYED = """
 Those that had just reached 90 %, on the same 12 layouts, as they are, behind the protective field, behind the shield,
 and with somebody to ask: layouts passed, and collisions.
 """
+WITH_ASKING = """
+The same of {seeds} seeds in all ways; who asks stops for it: `{command}`
+"""
+MORE = """
+Novices as they were when they had been proven, and after five more laps of teaching, on the same layouts:
+`{command}`
+"""
 ELSEWHERE = """
 The same where the world, the teacher, or the robot is another one than so far; a shift is applied when the novice is
 tried, not while it is taught.
@@ -54,7 +62,8 @@ def lead(summaries: Sequence[Summary]) -> str:
     main = found.get(LED_BY)
     if main is None:
         return HEAD + NOT_YET
-    elsewhere = [each for name, each in found.items() if name.startswith(f"{LED_BY}-")]
+    here = (ALL_WAYS, TAUGHT_ON)
+    elsewhere = [each for name, each in found.items() if name.startswith(f"{LED_BY}-") and name not in here]
     played = f"{main.trials} trials, played with {main.commit}" if main.commit else f"{main.trials} trials"
     parts = [
         HEAD,
@@ -64,6 +73,11 @@ def lead(summaries: Sequence[Summary]) -> str:
         f"\n## Until it passes all\n{ALL_PASSED}\n" + table(effort(main, 1)[:FIRST]) if efforts(main)[1:] else "",
         f"\n## Deployed\n{DEPLOYED}\n" + table(deployed(main)),
     ]
+    if ways := found.get(ALL_WAYS):
+        parts.append(WITH_ASKING.format(seeds=ways.seeds, command=ways.command) + "\n" + table(deployed(ways)))
+    if more := found.get(TAUGHT_ON):
+        words = MORE.format(command=more.command)
+        parts.append(f"\n## Taught on\n{words}\n" + table(taught_on(more)))
     if elsewhere:
         parts.append(f"\n## Elsewhere\n{ELSEWHERE}\n" + table([row for each in elsewhere for row in condition(each)]))
     if PARTS in found and found[PARTS].quality:
@@ -105,8 +119,23 @@ def deployed(summary: Summary) -> list[Row]:
     found: dict[object, Row] = {}
     for row in next((each.rows for each in summary.tables if each.title.startswith("Deployed")), []):
         words = f"{row['unseen_passed']} of {row['unseen_laps']}, {row['collisions']}"
+        if row["stops"]:
+            words += f", {row['stops']} stops"
         found.setdefault(row["method"], {"method": row["method"]})[str(row["deployed"])] = words
     return list(found.values())
+
+
+def taught_on(summary: Summary) -> list[Row]:
+    """Two rows per method: when it was proven, and after more laps."""
+    rows = next((each.rows for each in summary.tables if each.title.startswith("Taught on")), [])
+    return [
+        {
+            **{key: row[key] for key in ("method", "when")},
+            "unseen passed": passed(row),
+            "collisions per 100 m": row["collisions_100m"],
+        }
+        for row in rows
+    ]
 
 
 def condition(summary: Summary) -> list[Row]:
