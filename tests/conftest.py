@@ -25,7 +25,8 @@ from kinds import TAKES_LONG, kind_of
 from loopback import take_own_loopback
 
 # The tests share the processors, and small matrices multiply no faster on several threads, which wait for each other.
-os.environ.setdefault("OMP_NUM_THREADS", "1")
+# As whoever teaches does it: sums depend on it.
+os.environ["OMP_NUM_THREADS"] = "1"
 # A shell that runs the suite in the background ignores SIGINT, and so would every process that a test starts.
 signal.signal(signal.SIGINT, signal.default_int_handler)
 

@@ -35,6 +35,7 @@ PROCESSES = (
     "threading",
     "zenoh",
 )
+COMPUTES = "fresh.py"  # it starts what ends by itself, and as late as it likes
 TWIN = ("lira.sim_backend", "lira.fusion.learning", "lira.fusion.policies", "lira.tools", "pybullet", "torch")
 
 
@@ -43,10 +44,10 @@ def kind_of(path: Path) -> str:
     """Return "unit", "twin" or "processes" for a test file, with the helpers beside it that it imports."""
     names = _imported(path)
     helpers = [path.parent / f"{name}.py" for name in names if (path.parent / f"{name}.py").is_file()]
-    kinds = {kind_of(helper) for helper in helpers}
+    kinds = {kind_of(helper) for helper in helpers if helper.name != COMPUTES}
     if "processes" in kinds or _any_of(PROCESSES, names) or "e2e" in path.parts or "attack" in path.parts:
         return "processes"
-    return "twin" if "twin" in kinds or _any_of(TWIN, names) else "unit"
+    return "twin" if "twin" in kinds or "fresh" in names or _any_of(TWIN, names) else "unit"
 
 
 def _imported(path: Path) -> set[str]:

@@ -7,15 +7,12 @@ import zipfile
 from pathlib import Path
 
 import pytest
+from fresh import python
 
 import lira
 
 ROOT = Path(__file__).parent.parent
 HEAVY = {"torch", "numpy", "cv2", "zenoh", "pybullet", "pygame", "msgspec", "rosbags"}
-
-
-def python(code, *words):
-    return subprocess.run([sys.executable, *words, "-c", code], capture_output=True, text=True, check=False, timeout=60)
 
 
 def test_importing_it_loads_nothing_heavy():

@@ -4,7 +4,6 @@ import re
 from functools import partial
 
 import pytest
-import torch
 from safetensors.numpy import load_file
 from short_worlds import FEW_METRES
 
@@ -51,15 +50,6 @@ def demos(world, tmp_path_factory):
     return dict(zip(runs, children, strict=True))
 
 
-@pytest.fixture
-def one_thread():
-    """What the service computes with; more threads add up in another order."""
-    before = torch.get_num_threads()
-    torch.set_num_threads(1)
-    yield
-    torch.set_num_threads(before)
-
-
 def without_wall_clock(path):
     """A run record without what may differ: the time it took and the folder's name in the command."""
     text = re.sub(rb'"elapsed_s":[^,}]*', b"", path.read_bytes())
@@ -92,7 +82,7 @@ def test_one_seed_gives_one_run(demos):
     assert without_wall_clock(first / "run.jsonl") == without_wall_clock(second / "run.jsonl")
 
 
-def test_in_process_gives_the_same_decisions_as_over_the_bus(demos, world, one_thread, tmp_path):
+def test_in_process_gives_the_same_decisions_as_over_the_bus(demos, world, tmp_path):
     profile, floor = load_profile("thesis-sim"), load_world(str(world))
     twin = Twin(profile, floor, renderer="sketch")  # as the demo's
     robot = GovernedRobot(twin)

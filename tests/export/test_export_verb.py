@@ -1,13 +1,12 @@
 """`lira export` of a recording on disk, with and without the log of labels beside it."""
 
 import csv
-import subprocess
-import sys
 
 import h5py
 import msgspec
 import pyarrow.parquet as pq
 import pytest
+from fresh import python
 from heard import LENGTHS, PROFILE, label, recording
 
 from lira.fusion.log.label_log import DemonstrationLog
@@ -100,5 +99,5 @@ def test_nobody_needs_pytorch_for_it(run, tmp_path):
     taken = ["import", str(tmp_path / "set"), "--run", str(tmp_path / "warm")]
     absent = f"import sys; sys.modules.update(dict.fromkeys({['torch', 'safetensors', 'pybullet']}))"
     code = f"{absent}; from lira.tools.cli import main; sys.exit(main({words}) or main({taken}))"
-    done = subprocess.run([sys.executable, "-c", code], check=False, capture_output=True, text=True, timeout=60)
+    done = python(code)
     assert done.returncode == 0, done.stderr

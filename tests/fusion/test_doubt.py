@@ -4,7 +4,6 @@ import math
 
 import numpy as np
 import pytest
-import torch
 from nets import camera_net, lidar_net
 from taught import FEATURES, make_novice
 
@@ -79,14 +78,6 @@ def test_above_the_threshold_it_stands_and_asks_and_goes_on_when_it_is_sure():
     assert alone.propose(FEATURES).command == (0.9, 0.1)
 
 
-@pytest.fixture
-def _one_thread():
-    threads = torch.get_num_threads()
-    torch.set_num_threads(1)
-    yield
-    torch.set_num_threads(threads)
-
-
 def labels(count):
     rng = np.random.default_rng(0)
     for _ in range(count):
@@ -94,7 +85,6 @@ def labels(count):
         yield Label(Features(scan=scan, image=image.astype(np.float32)), (float(scan[0]), -0.5), "human")
 
 
-@pytest.mark.usefixtures("_one_thread")
 @pytest.mark.parametrize("frozen", [True, False])
 def test_the_ensemble_learns_too_and_changes_nothing_for_the_novice(frozen):
     plain = FusionNet.from_experts([camera_net(16, seed=4), lidar_net(101, seed=5)], seed=1)

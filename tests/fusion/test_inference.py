@@ -1,12 +1,11 @@
 """Networks as they drive, held to the same networks as they train; and what drives needs no torch."""
 
-import subprocess
-import sys
 from threading import Thread
 
 import numpy as np
 import pytest
 import torch
+from fresh import python
 from nets import camera_net, fusion_net, kernel_net, lidar_net, noise
 
 from lira.fusion.inference.architecture import Architecture
@@ -173,5 +172,5 @@ print(plus.novice.stored, plus.novice.act(seen)[0] > 0.5)
 
 
 def test_driving_and_teaching_by_plus_need_neither_torch_nor_a_simulator():
-    done = subprocess.run([sys.executable, "-c", BLOCKED], capture_output=True, text=True, timeout=60, check=False)
+    done = python(BLOCKED)
     assert (done.stdout.split(), done.stderr) == (["camera", "lidar", "1", "True"], "")

@@ -1,20 +1,11 @@
 import numpy as np
 import pytest
-import torch
 from nets import camera_net, lidar_net
 
 from lira.fusion.learning.labels import Label, is_rest, mirror
 from lira.fusion.learning.learner import Learner
 from lira.fusion.policies.networks import FusionNet
 from lira.fusion.preprocess import Features
-
-
-@pytest.fixture(autouse=True)
-def _one_thread():
-    threads = torch.get_num_threads()
-    torch.set_num_threads(1)
-    yield
-    torch.set_num_threads(threads)
 
 
 def labels(count, seed=0):

@@ -11,14 +11,6 @@ from lira.fusion.preprocess import Features
 SIZES = (101, 8)
 
 
-@pytest.fixture(autouse=True)
-def _one_thread():
-    threads = torch.get_num_threads()
-    torch.set_num_threads(1)
-    yield
-    torch.set_num_threads(threads)
-
-
 def labels(count: int, seed: int = 0) -> list[Label]:
     """Steer to the brighter half, slow down for what is near: both sensors matter."""
     rng = np.random.default_rng(seed)

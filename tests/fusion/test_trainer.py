@@ -8,7 +8,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-import torch
 from nets import lidar_net
 from test_learner import labels
 
@@ -17,14 +16,6 @@ from lira.fusion.learning.trainer import Beginning, InlineTrainer, ProcessTraine
 from lira.hal.errors import LiraError
 
 WAIT_S = 60.0  # for what is certain to come; only a hang takes that long
-
-
-@pytest.fixture(autouse=True)
-def _one_thread():
-    threads = torch.get_num_threads()
-    torch.set_num_threads(1)
-    yield
-    torch.set_num_threads(threads)
 
 
 def beginning(updates: int = 50) -> Beginning:

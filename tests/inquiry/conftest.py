@@ -3,7 +3,6 @@
 from functools import partial
 
 import pytest
-import torch
 from short_worlds import FEW_METRES
 
 from lira.fusion.inference.threads import one_thread
@@ -16,8 +15,7 @@ from lira.tools.runs.teach import teach_on
 
 def taught(method, tmp_path):
     """Teach for one lap; return the profile and all that was told on the bus."""
-    torch.set_num_threads(1)  # as whoever teaches does: sums depend on it
-    one_thread()
+    one_thread()  # as whoever teaches does: sums depend on it
     path = tmp_path / "few.toml"
     path.write_text(FEW_METRES)
     reports = []

@@ -3,7 +3,6 @@
 from collections import Counter
 from functools import partial
 
-import torch
 from recorded_run import write_reports
 from short_worlds import FEW_METRES
 
@@ -26,7 +25,6 @@ from lira.tools.runs.teach import teach_on
 
 
 def test_record_log_report_and_rerun_count_the_same_labels(tmp_path, capsys):
-    torch.set_num_threads(1)
     one_thread()
     world, folder, reports = tmp_path / "few.toml", tmp_path / "run", []
     world.write_text(FEW_METRES)

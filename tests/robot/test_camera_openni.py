@@ -1,11 +1,10 @@
 import shutil
-import subprocess
-import sys
 import time
 
 import numpy as np
 import pytest
 from camera_watch import DEBIAN, NO_OPENNI, Watch
+from fresh import python
 
 from lira.hal.errors import DeviceError
 from lira.hal.messages import Image
@@ -93,5 +92,5 @@ for folder in (Path({str(broken)!r}), Path({str(tmp_path / "nothing")!r}), Path(
         raise SystemExit("it loaded without drivers")
 load(Path({str(openni)!r}))
 """
-    done = subprocess.run([sys.executable, "-c", code], check=False, capture_output=True, text=True, timeout=60)
+    done = python(code)
     assert done.returncode == 0, done.stdout + done.stderr

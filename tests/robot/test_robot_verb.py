@@ -1,7 +1,7 @@
 import re
-import subprocess
-import sys
 import time
+
+from fresh import lira
 
 from lira.hal.bus.bus import Bus
 from lira.hal.client.connect import open_remote
@@ -11,14 +11,6 @@ from lira.sim_backend.emulators.core2 import Firmware
 from lira.sim_backend.emulators.wired_twin import WiredTwin
 from lira.sim_backend.twin import Twin
 from lira.tools.launch.processes import ChildProcess, free_port, lira_command
-
-
-def lira(*words, block=()):
-    """Run `lira` in a process of its own; importing a package in `block` fails as if it were not installed."""
-    code = f"import sys; sys.modules.update(dict.fromkeys({list(block)!r}))\n"
-    code += f"from lira.tools.cli import main; sys.exit(main({list(words)!r}))"
-    return subprocess.run([sys.executable, "-c", code], check=False, capture_output=True, text=True, timeout=60)
-
 
 GO = Twist(0.3, 0.0)
 NOT_ON_THE_ROBOT = ["torch", "pybullet", "pygame", "safetensors", "matplotlib"]

@@ -1,5 +1,4 @@
 import math
-import subprocess
 import sys
 import threading
 import time
@@ -7,6 +6,7 @@ from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 import pytest
+from fresh import python
 
 from lira.hal.errors import ConfigError, DeviceError
 from lira.hal.messages import Command, CompressedImage, Episode, Image, Reason, Source, Twist
@@ -297,9 +297,8 @@ def test_nothing_but_reports_reaches_the_standard_output():
         "from lira.hal.profile import load_profile; from lira.sim_backend.twin import Twin\n"
         "t = Twin(load_profile('rosbot2'), 'line'); t.open(); t.read(); t.close(); print('report')"
     )
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=60, check=True)
-    assert done.stdout == "report\n"
-    assert done.stderr == ""
+    done = python(code)
+    assert (done.returncode, done.stdout, done.stderr) == (0, "report\n", "")
 
 
 def test_quiet_gives_the_streams_back_after_an_error(capfd):

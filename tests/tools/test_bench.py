@@ -1,8 +1,7 @@
 import json
-import subprocess
-import sys
 
 import pytest
+from fresh import python
 
 from lira.tools import bench, cli
 
@@ -21,7 +20,7 @@ sys.exit(main(sys.argv[1:]))
 
 
 def lira(*words):
-    return subprocess.run([sys.executable, "-c", FAKE, *words], check=False, capture_output=True, text=True, timeout=60)
+    return python(FAKE, *words)
 
 
 def test_json_to_stdout_is_one_object_and_nothing_else():

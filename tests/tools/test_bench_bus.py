@@ -1,16 +1,8 @@
 """The fields that `lira bench lockstep` and `lira bench latency` promise. How fast they are is for the benchmarks."""
 
 import pytest
-import torch
 
 from lira.tools.bench import latency, lockstep
-
-
-@pytest.fixture(autouse=True)
-def _threads():
-    before = torch.get_num_threads()
-    yield
-    torch.set_num_threads(before)
 
 
 def test_lockstep_drives_learns_and_tells_how_fast(monkeypatch):

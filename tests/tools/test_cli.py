@@ -3,26 +3,11 @@ import sys
 from types import SimpleNamespace
 
 import pytest
+from fresh import lira
 
 from lira.hal.errors import ConfigError
 from lira.tools import cli
 from lira.tools.verbs import VERBS, Verb
-
-
-def lira(*words, block=()):
-    """Run `lira` in a process of its own; importing a package in `block` fails as if it were not installed."""
-    code = (
-        "import sys\n"
-        f"sys.modules.update(dict.fromkeys({list(block)!r}))\n"
-        f"from lira.tools.cli import main; sys.exit(main({list(words)!r}))"
-    )
-    return subprocess.run(
-        [sys.executable, "-c", code],
-        check=False,
-        capture_output=True,
-        text=True,
-        timeout=60,
-    )
 
 
 @pytest.fixture

@@ -5,7 +5,6 @@ import textwrap
 import uuid
 
 import pytest
-import torch
 from short_trials import write_world
 
 import lira
@@ -57,9 +56,7 @@ def lab(tmp_path, monkeypatch):
     (tmp_path / "doorlab.py").write_text(LAB)
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(sys, "path", [*sys.path])
-    threads = torch.get_num_threads()
     yield tmp_path
-    torch.set_num_threads(threads)  # a verb sets it for its whole process
     sys.modules.pop("doorlab", None)
 
 

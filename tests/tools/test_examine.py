@@ -3,7 +3,6 @@
 import uuid
 
 import pytest
-import torch
 from short_trials import SHORT, write_world
 
 from lira.fusion.experts.files import shipped_path
@@ -32,9 +31,7 @@ def lira(tmp_path, capsys):
             status = cli.main([*words, "--name", name, "--connect", address])
         return status, capsys.readouterr().out.splitlines()
 
-    threads = torch.get_num_threads()
-    yield run
-    torch.set_num_threads(threads)  # the verb sets it for its whole process
+    return run
 
 
 def test_each_layout_is_told(lira, tmp_path):

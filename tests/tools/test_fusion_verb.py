@@ -2,15 +2,13 @@
 
 import json
 import signal
-import subprocess
-import sys
 import threading
 import uuid
 from functools import partial
 
 import numpy as np
 import pytest
-import torch
+from fresh import lira
 
 from lira.fusion.experts.files import shipped_path
 from lira.fusion.inference.checkpoint import Checkpoint, save_checkpoint
@@ -47,10 +45,9 @@ def address():
 
 @pytest.fixture(autouse=True)
 def _as_it_was():
-    """The verb sets these for its whole process, and here that is ours."""
-    threads, handler = torch.get_num_threads(), signal.getsignal(signal.SIGTERM)
+    """The verb sets it for its whole process, and here that is ours."""
+    handler = signal.getsignal(signal.SIGTERM)
     yield
-    torch.set_num_threads(threads)
     signal.signal(signal.SIGTERM, handler)
 
 
@@ -217,10 +214,7 @@ def test_the_demo_names_a_folder_that_cannot_be_made(refused, tmp_path):
     ],
 )
 def test_a_missing_extra_says_what_to_install(package, extra, words, tmp_path):
-    code = f"import sys; sys.modules[{package!r}] = None\nfrom lira.tools.cli import main; sys.exit(main({words!r}))"
-    done = subprocess.run(
-        [sys.executable, "-c", code], check=False, capture_output=True, text=True, timeout=60, cwd=tmp_path
-    )
+    done = lira(*words, block=[package], cwd=tmp_path)
     assert done.returncode == 2
     assert done.stderr.splitlines() == [
         f"lira {words[0]}: {package} is not installed",

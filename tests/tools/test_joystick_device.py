@@ -1,9 +1,8 @@
 import ctypes
 import os
-import subprocess
-import sys
 
 import pytest
+from fresh import lira, python
 
 from lira.hal.errors import DeviceError
 from lira.tools.joystick.axes import AxisRange, PadEvent, PadState
@@ -136,19 +135,14 @@ def test_a_pad_that_goes_while_it_rumbles_raises_nothing():
 
 @pytest.mark.parametrize("verb", ["joystick", "console"])
 def test_help_needs_neither_pygame_nor_evdev(verb):
-    code = (
-        "import sys; sys.modules.update(dict.fromkeys(['pygame', 'evdev', 'zenoh', 'cv2'])); "
-        f"from lira.tools.cli import main; main([{verb!r}, '--help'])"
-    )
-    done = subprocess.run([sys.executable, "-c", code], check=False, capture_output=True, text=True, timeout=60)
+    done = lira(verb, "--help", block=["pygame", "evdev", "zenoh", "cv2"])
     assert done.returncode == 0, done.stderr
     assert "examples:" in done.stdout
 
 
 @pytest.mark.parametrize(("verb", "package", "extra"), [("console", "pygame", "console")])
 def test_a_missing_package_is_named_before_a_robot_is_looked_for(verb, package, extra):
-    code = f"import sys; sys.modules[{package!r}] = None; from lira.tools.cli import main; sys.exit(main([{verb!r}]))"
-    done = subprocess.run([sys.executable, "-c", code], check=False, capture_output=True, text=True, timeout=60)
+    done = lira(verb, block=[package])
     assert done.returncode == 2
     assert done.stderr.splitlines() == [
         f"lira {verb}: {package} is not installed",
@@ -159,12 +153,11 @@ def test_a_missing_package_is_named_before_a_robot_is_looked_for(verb, package, 
 def test_the_bridge_needs_no_package():
     code = "import sys; sys.modules.update(pygame=None, evdev=None); "
     code += "from lira.tools.joystick import bridge, client, pad_wizard\nfrom lira.tools.joystick.device import pad"
-    assert subprocess.run([sys.executable, "-c", code], check=False, timeout=60).returncode == 0
+    assert python(code).returncode == 0
 
 
 def test_an_unknown_pad_is_refused_before_a_robot_is_looked_for():
-    command = [sys.executable, "-m", "lira.tools", "joystick", "--pad", "nosuch"]
-    done = subprocess.run(command, check=False, capture_output=True, text=True, timeout=60)
+    done = lira("joystick", "--pad", "nosuch")
     assert done.returncode == 2
     assert "unknown pad 'nosuch'" in done.stderr
 

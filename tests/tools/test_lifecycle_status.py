@@ -8,6 +8,7 @@ import time
 
 import msgspec
 import pytest
+from fresh import python
 
 from lira.hal.bus.sensors import SENSORS
 from lira.hal.errors import ConfigError
@@ -46,7 +47,7 @@ def test_a_name_has_one_supervisor_and_everybody_sees_who(state_folder, monkeypa
         assert folders.names() == ["rosbot"]
         code = "import sys; from lira.tools.lifecycle.folder import StateFolder\n"
         code += "print(StateFolder('rosbot').supervisor())"
-        seen = subprocess.run([sys.executable, "-c", code], check=True, capture_output=True, text=True, timeout=30)
+        seen = python(code)
         assert seen.stdout.strip() == str(os.getpid())
         with pytest.raises(AlreadyUpError, match="'rosbot' is up already"), state_folder.held():
             pass

@@ -2,11 +2,11 @@
 
 import re
 import subprocess
-import sys
 import time
 from pathlib import Path
 
 import pytest
+from fresh import python
 
 from lira.tools import cli
 from lira.tools.launch.processes import free_port, lira_command
@@ -75,7 +75,7 @@ def test_a_twin_whose_reader_has_gone_ends_without_a_word():
 def test_closed_descriptors(tmp_path, closed):
     """The log that is opened next must not become one of them."""
     code = f"import os, sys; [os.close(n) for n in {closed}]; os.execv(sys.executable, {lira_command('--version')!r})"
-    done = subprocess.run([sys.executable, "-c", code], check=False, capture_output=True, text=True, timeout=60)
+    done = python(code)
     if 1 in closed:
         assert done.returncode == 2
         assert done.stderr == "" if 2 in closed else one_line_and_remedy(done)

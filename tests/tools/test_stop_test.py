@@ -5,14 +5,13 @@ import json
 import math
 import os
 import socket
-import subprocess
-import sys
 import threading
 import time
 from dataclasses import replace
 from itertools import groupby
 
 import pytest
+from fresh import python
 
 from lira.hal.messages import Reason, Twist
 from lira.tools.cli import main
@@ -356,7 +355,7 @@ def test_a_mutant_is_caught_by_rows_that_fail_because_of_it_and_by_nothing_else(
 
 def test_every_mutant_finds_what_it_breaks():
     apply = "from lira.tools.stop_test.mutants import *\nfor one in MUTANTS: break_product(one.name)"
-    done = subprocess.run([sys.executable, "-c", apply], capture_output=True, text=True, timeout=60, check=False)
+    done = python(apply)
     assert done.returncode == 0, done.stderr
 
 

@@ -3,7 +3,6 @@
 import signal
 
 import pytest
-import torch
 
 from lira.fusion.inference.checkpoint import load_checkpoint
 from lira.fusion.teaching.curriculum import CURRICULA, STRICT, Curriculum
@@ -14,9 +13,8 @@ from lira.tools import cli
 
 @pytest.fixture(autouse=True)
 def _as_it_was():
-    threads, handler = torch.get_num_threads(), signal.getsignal(signal.SIGTERM)
+    handler = signal.getsignal(signal.SIGTERM)
     yield
-    torch.set_num_threads(threads)
     signal.signal(signal.SIGTERM, handler)
 
 

@@ -1,9 +1,8 @@
 import signal
-import subprocess
-import sys
 
 import msgspec
 import pytest
+from fresh import lira
 
 from lira.hal.bus.bus import Bus
 from lira.hal.client.connect import open_remote
@@ -11,13 +10,6 @@ from lira.hal.messages import STOP, Command, Twist
 from lira.sim_backend.catalogue import load_world
 from lira.sim_backend.world import World
 from lira.tools.launch.processes import ChildProcess, free_port, lira_command
-
-
-def lira(*words, block=()):
-    """Run `lira` in a process of its own; importing a package in `block` fails as if it were not installed."""
-    code = f"import sys; sys.modules.update(dict.fromkeys({list(block)!r}))\n"
-    code += f"from lira.tools.cli import main; sys.exit(main({list(words)!r}))"
-    return subprocess.run([sys.executable, "-c", code], check=False, capture_output=True, text=True, timeout=60)
 
 
 def test_an_unknown_world_names_the_known_ones_before_anything_heavy_is_loaded():
