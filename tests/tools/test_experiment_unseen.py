@@ -178,7 +178,7 @@ def test_where_by_whom_and_with_whose_experts_can_be_chosen():
         "--shift gray --randomise --laps 20 --more 5 --ways plain,ask"
     )
     assert all(each.quality.randomised for each in trials)
-    assert asked.elsewhere == "-race-unskilled-randomised-gray-more5"
+    assert asked.elsewhere == "-race-unskilled-randomised-gray-more5-ask"
     assert len({each.file for each in trials}) == 4
 
 

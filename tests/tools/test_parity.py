@@ -254,6 +254,7 @@ def test_wrong_words_are_refused_at_once(words, complaint, capsys):
 def test_the_twin_and_its_wire_behave_alike(tmp_path, capsys, monkeypatch):
     for name, value in {"STAND_S": 1.5, "STEP_S": 1.2, "REST_S": 0.9, "REACH_M": 0.48}.items():
         monkeypatch.setattr(script, name, value)  # half the time, as fast
+    monkeypatch.setattr(parity, "ATTEMPTS", 6)  # a busy machine lets a robot stand now and then
     out = tmp_path / "out"
     settings = tmp_path / "mine.toml"
     settings.write_text("[base]\ndistance_scale = 1.2\n")
