@@ -7,7 +7,6 @@ import uuid
 import numpy as np
 import pyarrow.parquet as pq
 import pytest
-from rerun.chunk import RrdReader
 from short_worlds import FEW_METRES
 
 from lira.fusion.log.label_log import read_demonstrations
@@ -74,6 +73,8 @@ def test_what_the_learner_saw_is_in_the_data_set(run):
 
 
 def test_rerun_gets_a_file_of_it(run, tmp_path):
+    from rerun.chunk import RrdReader  # it takes a while
+
     file = tmp_path / "run.rrd"
     with ChildProcess("view", lira_command("view", str(run), "--rerun", str(file)), tmp_path / "view.log") as view:
         assert view.wait(60.0) == 0, view.output()

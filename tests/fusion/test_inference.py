@@ -1,6 +1,6 @@
 """Networks as they drive, held to the same networks as they train; and what drives needs no torch."""
 
-from threading import Thread
+from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 import pytest
@@ -117,11 +117,8 @@ def test_threads_that_ask_at_once_do_not_disturb_each_other():
     def ask(network):
         wrong.extend(k for k in range(400) if network.act(noise(101, k % 4)) != expected[k % 4])
 
-    threads = [Thread(target=ask, args=[network]) for network in networks]
-    for thread in threads:
-        thread.start()
-    for thread in threads:
-        thread.join()
+    with ThreadPoolExecutor() as pool:
+        list(pool.map(ask, networks))
     assert not wrong
 
 

@@ -1,30 +1,14 @@
 import numpy as np
 import pytest
 import torch
+from lessons import BINS, labels
 from nets import camera_net, fusion_net, lidar_net
 from torch import nn
 
 from lira.fusion.learning.learner import Label, Learner
 from lira.fusion.policies.networks import FusionNet
-from lira.fusion.preprocess import Features
 
-SIZES = (101, 8)
-
-
-def labels(count: int, seed: int = 0) -> list[Label]:
-    """Steer to the brighter half, slow down for what is near: both sensors matter."""
-    rng = np.random.default_rng(seed)
-    made = []
-    for _ in range(count):
-        gray = rng.integers(0, 60, (32, 32))
-        side = rng.choice([-1, 1])
-        gray[:, 16:] += 150 * (side > 0)
-        gray[:, :16] += 150 * (side < 0)
-        near = rng.random()
-        scan = np.clip(near + 0.05 * rng.random(SIZES[0]), 0, 1).astype(np.float32)
-        image = (gray / 255).astype(np.float32)
-        made.append(Label(Features(scan=scan, image=image), (2 * near - 1, 0.6 * float(side)), "human"))
-    return made
+SIZES = (BINS, 8)
 
 
 def error(network, made: list[Label]) -> float:

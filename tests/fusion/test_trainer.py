@@ -8,10 +8,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from nets import lidar_net
-from test_learner import labels
+from lessons import labels
 
-from lira.fusion.learning.learner import Learner
 from lira.fusion.learning.trainer import Beginning, InlineTrainer, ProcessTrainer
 from lira.hal.errors import LiraError
 
@@ -19,6 +17,10 @@ WAIT_S = 60.0  # for what is certain to come; only a hang takes that long
 
 
 def beginning(updates: int = 50) -> Beginning:
+    from nets import lidar_net  # with torch, which whoever waits does without
+
+    from lira.fusion.learning.learner import Learner
+
     network = lidar_net(101)
     return Beginning(network.architecture, partial(Learner, network, seed=1, frozen_trunks=False, updates=updates))
 
