@@ -162,9 +162,7 @@ class Learner:
         if self._trunks:
             for parameter in self._trunks:
                 parameter.grad = None
-            # Not `features.backward(below)`: PyTorch would load its symbolic shapes, which takes half a second.
-            below = slope[0] @ self._heads.weights[0][0].T
-            (features * below).sum().backward()  # type: ignore[no-untyped-call]
+            _Known.apply(features, slope[0] @ self._heads.weights[0][0].T).backward()  # type: ignore[no-untyped-call]
         if self._members:
             times = targets[:, 3:].T.unsqueeze(2)
             self._doubters.descend(seen, actions, times * weights)
@@ -195,6 +193,24 @@ class Learner:
     def _frozen_features(self, inputs: Inputs) -> Tensor:
         with torch.no_grad():
             return self._network.features(inputs)
+
+
+class _Known(torch.autograd.Function):
+    """A number whose slope is known. To go back from the features themselves, PyTorch would load its symbolic shapes
+    first, which takes half a second.
+    """
+
+    @staticmethod
+    def forward(ctx: Any, features: Tensor, slope: Tensor) -> Tensor:
+        """Any number does."""
+        ctx.save_for_backward(slope)
+        return features.new_zeros(())
+
+    @staticmethod
+    def backward(ctx: Any, _: Tensor) -> tuple[Tensor, None]:
+        """The slope at the features."""
+        (slope,) = ctx.saved_tensors
+        return slope, None
 
 
 def _picked(store: Rows[Any], pick: Tensor) -> Tensor:
