@@ -22,10 +22,14 @@ from lira.tools.launch.processes import ChildProcess, free_port, lira_command
 from lira.tools.live.scripted_person import live, person_for
 from lira.tools.report.digest import load_run
 
-pytestmark = [pytest.mark.slow, pytest.mark.alone, pytest.mark.skipif(not LONG, reason=TAKES_LONG)]
 WORLD, SPEED = "line-obstacles", 1.5
 PAD = 5
 READY_S, WHOLE_S = 90.0, 600.0
+LONGEST_S = 2 * (READY_S + WHOLE_S)
+pytestmark = [
+    *(pytest.mark.slow, pytest.mark.alone, pytest.mark.timeout(LONGEST_S)),
+    pytest.mark.skipif(not LONG, reason=TAKES_LONG),
+]
 MIDDLE, REACH = 128, 127
 FAKE_PAD = """
 window.pad = { id: "A pad (STANDARD)", connected: true, mapping: "standard", axes: [0, 0, 0, 0],
