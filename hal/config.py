@@ -14,11 +14,11 @@ from typing import BinaryIO, TypeVar
 import msgspec
 
 from lira.hal.errors import ConfigError, StorageError
+from lira.hal.misfit import COMPARE, in_words
 
 T = TypeVar("T")
 MOST_BYTES = 2**20  # a hundred times the longest that comes with the project
 MOST_DOTS = 5000  # in a line of TOML, whose parser takes minutes for a key of so many parts
-COMPARE = "Compare the file with the ones that come with the project."
 # What decoding raises for text that is not what it should be. Deep nesting ends at Python's limit of recursion.
 MALFORMED = (msgspec.MsgspecError, ValueError, OverflowError, RecursionError)
 
@@ -73,9 +73,7 @@ def parse_toml(text: str, kind: type[T], where: str) -> T:
     except RecursionError as error:
         raise ConfigError(f"{where} is nested too deeply", COMPARE) from error
     except MALFORMED as error:
-        # msgspec ends its message with the place, e.g. "- at `$.line.width_m`".
-        message = str(error).replace("Object contains unknown field", "unknown key").replace("`$.", "`")
-        raise ConfigError(f"{where}: {message}", COMPARE) from error
+        raise misfit(error, kind, where) from error
 
 
 def load_json(path: Path, kind: type[T], most: int = MOST_BYTES) -> T:
@@ -85,7 +83,13 @@ def load_json(path: Path, kind: type[T], most: int = MOST_BYTES) -> T:
     except RecursionError as error:
         raise ConfigError(f"{path} is nested too deeply", COMPARE) from error
     except MALFORMED as error:
-        raise ConfigError(f"{path}: {error}", COMPARE) from error
+        raise misfit(error, kind, str(path)) from error
+
+
+def misfit(error: Exception, kind: type[T], where: str) -> ConfigError:
+    """Return an error that says what in `where` does not fit `kind`, and what would."""
+    what, remedy = in_words(error, kind)
+    return ConfigError(f"{where}: {what}", remedy)
 
 
 def write_whole(path: Path, data: bytes, *, folder: bool = False) -> None:

@@ -19,7 +19,8 @@ MAY_IMPORT = {
 ROOMS = {
     "hal": {
         "errors": set(),
-        "config": {"errors"},
+        "misfit": set(),
+        "config": {"errors", "misfit"},
         "clock": set(),
         "plugins": {"errors"},
         "messages": {"errors"},
