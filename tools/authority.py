@@ -60,8 +60,11 @@ def init(folder: Path, life: timedelta = PEER_LIFE) -> None:
     """Make the robot's and the laptop's bundle. Raises `ConfigError` if there are any, `StorageError`."""
     if (folder / AUTHORITY).exists():
         raise ConfigError(f"{folder} holds keys already", "Choose another folder, or add a peer with: lira keys enroll")
+    made_here = not folder.exists()
     try:
         _make(folder, ROBOT, ROBOT_LIFE)
+        if made_here:
+            (folder / ".gitignore").write_text("*\n")  # nobody commits a private key by accident
         (folder / ROBOT / CA).write_bytes(b"")
         (folder / ROBOT / ROLES).write_bytes(b"")
     except OSError as error:

@@ -196,7 +196,7 @@ def read_format(file: BinaryIO, path: Path) -> Format:
     """Read the header. Raises `StorageError` for a file that is no log, or whose header cannot be read."""
     start = file.read(_BEGIN.size)
     if len(start) < _BEGIN.size or not start.startswith(MAGIC):
-        raise StorageError(f"{path} is no demonstration log", "Give the path of a log, or of a new file.")
+        raise StorageError(f"{path} is no log of labels", "Give the path of a log of labels, or of its run's folder.")
     _, version = _BEGIN.unpack(start)
     if version not in (1, VERSION):
         raise StorageError(f"{path} is a log of version {version}", f"This program reads versions 1 to {VERSION}.")

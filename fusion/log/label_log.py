@@ -263,5 +263,5 @@ def _size(file: int, path: Path) -> int:
     """Size of an open file. Raises `StorageError` for a pipe or a device."""
     status = os.fstat(file)
     if not stat.S_ISREG(status.st_mode):
-        raise StorageError(f"{path} is no file", "Give the path of a log, or of a new file.")
+        raise StorageError(f"{path} is no file", "Give the path of a log of labels, or of a new file.")
     return status.st_size

@@ -78,7 +78,9 @@ def test_robomimic_gets_its_file(run, tmp_path):
 def test_nothing_is_written_over(run, tmp_path, capsys):
     (tmp_path / "run.csv").write_text("mine")
     assert main(["export", "csv", str(run), str(tmp_path / "run.csv")]) == 2
-    assert "Choose another file" in capsys.readouterr().err
+    assert "nothing is written over" in capsys.readouterr().err
+    assert main(["export", "csv", str(run), str(tmp_path / "gone" / "run.csv")]) == 2
+    assert f"there is no folder {tmp_path / 'gone'}" in capsys.readouterr().err
 
 
 def test_a_message_that_cannot_be_read_is_left_out(tmp_path):

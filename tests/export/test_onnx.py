@@ -97,7 +97,7 @@ def test_a_file_says_what_it_is_and_the_verb_writes_it(tmp_path, capsys):
     assert float(said["limit"]) > 0.0
     assert [each.name for each in model.graph.input] == ["image", "scan"]
     assert main(["export", "onnx", str(given), str(out)]) == 2  # nothing is written over
-    assert "cannot write" in capsys.readouterr().err
+    assert "is there already" in capsys.readouterr().err
 
 
 def test_what_cannot_be_written_or_read_is_said(tmp_path, capsys):

@@ -39,18 +39,19 @@ def test_each_layout_is_told(lira, tmp_path):
     path.write_text(SHORT.replace("y_m = 0.1", "y_m = 9.0"))
     status, lines = lira(str(path), *EXAM)
     assert status == 0
-    assert [line.split()[:4] for line in lines] == [["unseen", "layout", str(k), "passed"] for k in (7, 8)]
+    assert "drives layouts 7 to 8 of " in lines[0]
+    assert [line.split()[:4] for line in lines[1:]] == [["unseen", "layout", str(k), "passed"] for k in (7, 8)]
 
 
 def test_a_policy_that_hits_a_box_has_failed(lira, tmp_path):
-    status, lines = lira(write_world(tmp_path), *EXAM)
+    status, (_, *lines) = lira(write_world(tmp_path), *EXAM)
     assert status == 1
     assert len(lines) == 2
     assert all("failed" in line and "collisions 1" in line for line in lines)
 
 
 def test_behind_a_shield_it_hits_none_and_how_often_that_was_so_is_told(lira, tmp_path):
-    _, lines = lira(write_world(tmp_path), *EXAM, "--shield")
+    _, (_, *lines) = lira(write_world(tmp_path), *EXAM, "--shield")
     assert len(lines) == 2
     assert all("collisions 0" in line and "turns changed by the shield" in line for line in lines)
 

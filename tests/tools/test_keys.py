@@ -194,3 +194,9 @@ def test_the_verb_makes_closed_keys_and_never_writes_over(tmp_path, capsys):
     (folder / "bob" / KEY).unlink()
     with pytest.raises(ConfigError, match=r"key.pem is missing"):
         load_keys(folder / "bob")
+
+
+def test_a_folder_of_keys_is_for_no_repository_and_others_are_left_as_they_are(folder, tmp_path):
+    assert (folder / ".gitignore").read_text() == "*\n"
+    init(tmp_path)
+    assert not (tmp_path / ".gitignore").exists()

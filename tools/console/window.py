@@ -106,9 +106,9 @@ def show(look: Callable[[], View], keyboard: Keyboard | None, stop: threading.Ev
     """Show until the window is closed or `stop` is set."""
     pygame.display.init()
     pygame.font.init()
-    sounds = load_sounds()
     try:
         check_screen(pygame.display.get_driver(), os.environ.get("SDL_VIDEODRIVER"))
+        sounds = load_sounds()
         desktop = pygame.display.get_desktop_sizes()[0]
         screen = pygame.display.set_mode(window_size(SIZE, desktop), pygame.RESIZABLE)
         pygame.display.set_caption("lira console")

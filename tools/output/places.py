@@ -5,6 +5,15 @@ from pathlib import Path
 from lira.hal.errors import StorageError
 
 
+def check_new(path: Path) -> None:
+    """Raise `StorageError` for what is there already, or has no folder to be in: nothing is written over."""
+    check_folder(path.parent)
+    if path.exists():
+        raise StorageError(f"{path} is there already", "Choose another name: nothing is written over.")
+    if not path.parent.exists():
+        raise StorageError(f"cannot write {path}: there is no folder {path.parent}", "Make it, or choose another.")
+
+
 def check_folder(path: Path) -> None:
     """Raise `StorageError` for what can be no folder: a file is there, or on the way to it."""
     there = next(each for each in (path, *path.absolute().parents) if each.exists())

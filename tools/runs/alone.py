@@ -42,4 +42,5 @@ def examine(args: argparse.Namespace, robot: RemoteRobot, publish: Publish, say:
         journal = Journal(write=telling(say), publish=publish)
         unseen = range(args.layout + 1, args.layout + 1 + args.unseen)
         course = Course(robot.profile, world, unseen=unseen)
+        say(f"'{args.policy}' drives layouts {unseen[0]} to {unseen[-1]} of '{world.name}' alone")
         return 0 if show_alone(robot, arena, policy, journal, course) else 1

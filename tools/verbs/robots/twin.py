@@ -34,7 +34,7 @@ if TYPE_CHECKING:
 
 LOOK_S = 0.2
 STATUS_S = 10.0
-DRAWN = {"sketch": "sketched without pybullet", "tiny": "drawn by pybullet", "egl": "drawn by pybullet with OpenGL"}
+DRAWN = {"sketch": "sketched", "tiny": "drawn by pybullet", "egl": "drawn by pybullet with OpenGL"}
 LIDAR = "a2m8-1.29"
 ECHOES = 0.5  # of the directions ahead: with less the learner refuses the scan
 

@@ -88,7 +88,9 @@ def package_of(name: str) -> str:
     taken = keyword.iskeyword(package) or package in sys.stdlib_module_names or package in ("lira", "numpy", "pytest")
     if taken or not package.isidentifier() or package != package.lower():
         what = f"'{name}' cannot be the name of a module"
-        raise ConfigError(what, "Use small letters, digits and hyphens, and no name that Python has already: my-wall.")
+        raise ConfigError(
+            what, "Use small letters, digits and hyphens, and no name that Python has already, such as my-wall."
+        )
     return package
 
 
