@@ -54,6 +54,7 @@ class TeacherSettings(Table, frozen=True):
 
 
 SLOWED = 0.5  # of the speed that was foreseen: a robot that is slower is being slowed down
+SLOWED_S = 1.0  # longer than that takes to where a step would have led: a robot that is not there by then stands
 AS_FORESEEN = 1e-6  # metres, radians and so on: a robot that is so near to where it was foreseen is there
 NOBODY: Mapping[str, Policy] = MappingProxyType({})
 
@@ -79,7 +80,8 @@ class Outlook:
         """Whether the same policy was slowed down, and is not as far yet as it was foreseen to be a step later."""
         first = self.drive[0]
         slow = abs(state.linear_m_s) < SLOWED * abs(first.linear_m_s)
-        return slow and policy == self.policy and _gap_m(self.began, state) < _gap_m(self.began, first)
+        soon = state.stamp_s < self.began.stamp_s + SLOWED_S
+        return slow and soon and policy == self.policy and _gap_m(self.began, state) < _gap_m(self.began, first)
 
 
 def _gap_m(one: CourseState, other: CourseState) -> float:

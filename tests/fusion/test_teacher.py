@@ -128,6 +128,9 @@ class TestSlowedDown:
     def test_it_is_looked_at_anew_where_it_would_have_decided_anew(self):
         assert self.asked((0.06, 0.3), (0.12, 0.3), (0.18, 0.3), (0.24, 0.3), (0.30, 0.3)) == [0.0, 0.24]
 
+    def test_one_that_came_to_a_stand_on_its_way_is_looked_at_again_and_again(self):
+        assert self.asked(*[(0.06, 0.0)] * 12) == [0.0, 0.06, 0.06]
+
     def test_one_that_is_as_fast_as_was_foreseen_is_looked_at_wherever_else_it_is(self):
         assert self.asked((0.1, 1.0)) == [0.0, 0.1]
 
