@@ -14,7 +14,7 @@ import tempfile
 from contextlib import suppress
 from pathlib import Path
 
-WAITING, COMPUTING = 6, 2  # workers
+WAITING, COMPUTING = 5, 2  # workers
 FILE_BY_FILE = ("--dist", "loadfile", "--no-loadscope-reorder")
 LEAST = 19  # niceness
 
