@@ -10,7 +10,7 @@ from lira.hal.bus.services import ask_info
 from lira.hal.bus.topics import CMD_VEL, ESTOP_PRESS, ESTOP_RELEASE, INFO, RESET, TELEOP, TOPICS
 from lira.tools.stop_test.starved import longest_s, waits_s
 
-FLOOD_S = 1.5
+FLOOD_S = 1.0
 BUDGET_S = 0.35
 ATTEMPTS = 3  # the attackers take the robot's processors, too, which on a robot nobody does
 STARVED_S = 0.02

@@ -493,7 +493,7 @@ IN_SHORT = {
     "link": ("link's process frozen (SIGSTOP)",),
     "drivers": ("robot's governor hangs", "board hears no more"),
     "keys": ("put without a certificate",),
-    "clocks": ("robot's clock an hour behind", "driver's clock an hour ahead"),
+    "clocks": ("robot's clock an hour behind",),
 }
 
 
