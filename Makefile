@@ -26,6 +26,7 @@ $(VENV)/.installed: pyproject.toml constraints.txt
 	@$(BIN)/python -m pip --version >/dev/null 2>&1 || $(PYTHON) -m venv --clear $(VENV)
 	@echo "installing into $(VENV): 3 GB, PyTorch above all, which takes some minutes"
 	$(BIN)/python -m pip install --quiet --constraint constraints.txt --editable '.[dev]'
+	@-$(BIN)/python -m pytest --collect-only >/dev/null  # compiles all once, which else each of many processes does
 	@touch $@
 
 # Nothing of it is needed to use the project: tests that find none are skipped, and say so.
