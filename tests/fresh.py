@@ -5,7 +5,7 @@ import sys
 from collections.abc import Collection
 from pathlib import Path
 
-TIMEOUT_S = 60.0
+TIMEOUT_S = 180.0
 
 
 def python(code: str, *words: str, cwd: Path | None = None) -> subprocess.CompletedProcess[str]:

@@ -9,7 +9,7 @@ from lira.sim_backend.catalogue import load_world
 from lira.tools.cli import main
 from lira.tools.joystick.known_pads import PadMemory
 
-AT_ONCE_S = 5.0
+AT_ONCE_S = 20.0  # what reads without end takes longer
 
 VERBS = {
     "world": ["world", "{file}", "--picture", "{folder}/out.png"],
