@@ -14,7 +14,7 @@ from typing import BinaryIO, TypeVar
 import msgspec
 
 from lira.hal.errors import ConfigError, StorageError
-from lira.hal.misfit import COMPARE, in_words
+from lira.hal.misfit import COMPARE, misfit
 
 T = TypeVar("T")
 MOST_BYTES = 2**20  # a hundred times the longest that comes with the project
@@ -84,12 +84,6 @@ def load_json(path: Path, kind: type[T], most: int = MOST_BYTES) -> T:
         raise ConfigError(f"{path} is nested too deeply", COMPARE) from error
     except MALFORMED as error:
         raise misfit(error, kind, str(path)) from error
-
-
-def misfit(error: Exception, kind: type[T], where: str) -> ConfigError:
-    """Return an error that says what in `where` does not fit `kind`, and what would."""
-    what, remedy = in_words(error, kind)
-    return ConfigError(f"{where}: {what}", remedy)
 
 
 def write_whole(path: Path, data: bytes, *, folder: bool = False) -> None:

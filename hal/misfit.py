@@ -6,6 +6,8 @@ from typing import Any
 
 from msgspec import inspect
 
+from lira.hal.errors import ConfigError
+
 COMPARE = "Compare the file with the ones that come with the project."
 KINDS = {
     "float": "a number",
@@ -24,8 +26,11 @@ _EXPECTED = re.compile("Expected (.*), got ")
 _MISSING = re.compile(r"Object missing required field `(.*?)`")
 
 
-def in_words(error: Exception, kind: Any) -> tuple[str, str]:
-    """Say what does not fit `kind`, and the remedy. msgspec's message ends with the place, "- at `$.line.width_m`"."""
+def misfit(error: Exception, kind: Any, where: str) -> ConfigError:
+    """Return an error that says what in `where` does not fit `kind`, and what would.
+
+    msgspec's message ends with the place, such as "- at `$.line.width_m`".
+    """
     message = str(error)
     place = found[1] if (found := _PLACE.search(message)) else ""
     remedy = COMPARE
@@ -36,7 +41,7 @@ def in_words(error: Exception, kind: Any) -> tuple[str, str]:
     message = _KIND_NAMES.sub(_kinds, message)
     if expected := _EXPECTED.match(message):
         remedy = f"Write {expected[1]} there."
-    return message, remedy
+    return ConfigError(f"{where}: {message}", remedy)
 
 
 def _kinds(names: re.Match[str]) -> str:

@@ -19,7 +19,7 @@ MAY_IMPORT = {
 ROOMS = {
     "hal": {
         "errors": set(),
-        "misfit": set(),
+        "misfit": {"errors"},
         "config": {"errors", "misfit"},
         "clock": set(),
         "plugins": {"errors"},

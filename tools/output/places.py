@@ -5,12 +5,15 @@ from pathlib import Path
 from lira.hal.errors import StorageError
 
 
-def check_new(path: Path) -> None:
-    """Raise `StorageError` for what is there already, or has no folder to be in: nothing is written over."""
+def check_new(path: Path, *, folders: bool = False) -> None:
+    """Raise `StorageError` for what is there already, or has no folder to be in: nothing is written over.
+
+    `folders`: they are made where there are none.
+    """
     check_folder(path.parent)
     if path.exists():
         raise StorageError(f"{path} is there already", "Choose another name: nothing is written over.")
-    if not path.parent.exists():
+    if not folders and not path.parent.exists():
         raise StorageError(f"cannot write {path}: there is no folder {path.parent}", "Make it, or choose another.")
 
 

@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from functools import partial
+from itertools import chain
 from pathlib import Path
 
 from lira.hal.config import write_whole
@@ -87,9 +88,14 @@ def lead(summaries: Sequence[Summary]) -> str:
     return "".join(parts)
 
 
+def rows_of(summary: Summary, title: str) -> list[list[Row]]:
+    """The rows of each table whose title begins so."""
+    return [each.rows for each in summary.tables if each.title.startswith(title)]
+
+
 def efforts(summary: Summary) -> list[list[Row]]:
     """The tables of effort, one for each level of quality, the lowest first."""
-    return [each.rows for each in summary.tables if each.title.startswith("Effort")]
+    return rows_of(summary, "Effort")
 
 
 def effort(summary: Summary, level: int = 0) -> list[Row]:
@@ -117,7 +123,7 @@ def effort(summary: Summary, level: int = 0) -> list[Row]:
 def deployed(summary: Summary) -> list[Row]:
     """One row per method, a column per way."""
     found: dict[object, Row] = {}
-    for row in next((each.rows for each in summary.tables if each.title.startswith("Deployed")), []):
+    for row in chain.from_iterable(rows_of(summary, "Deployed")):
         words = f"{row['unseen_passed']} of {row['unseen_laps']}, {row['collisions']}"
         if row["stops"]:
             words += f", {row['stops']} stops"
@@ -127,14 +133,13 @@ def deployed(summary: Summary) -> list[Row]:
 
 def taught_on(summary: Summary) -> list[Row]:
     """Two rows per method: when it was proven, and after more laps."""
-    rows = next((each.rows for each in summary.tables if each.title.startswith("Taught on")), [])
     return [
         {
             **{key: row[key] for key in ("method", "when")},
             "unseen passed": passed(row),
             "collisions per 100 m": row["collisions_100m"],
         }
-        for row in rows
+        for row in chain.from_iterable(rows_of(summary, "Taught on"))
     ]
 
 

@@ -46,12 +46,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Read the run, or the novice, and write it."""
-    from lira.tools.output.places import check_folder, check_new
+    from lira.tools.output.places import check_new
 
-    if args.format == "lerobot" and not args.out.exists():
-        check_folder(args.out)  # with all above it
-    else:
-        check_new(args.out)
+    check_new(args.out, folders=args.format == "lerobot")
     if args.format == "onnx":
         return write_network(args)
     from lira.tools.export.run import load_run
