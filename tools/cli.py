@@ -42,8 +42,7 @@ EXTRAS = {
 }
 
 EXIT_ERROR = 2
-EXIT_SIGNAL = 128  # and the signal's number
-EXIT_BROKEN_PIPE = EXIT_SIGNAL + signal.SIGPIPE
+EXIT_BROKEN_PIPE = lifetime.EXIT_SIGNAL + signal.SIGPIPE
 
 
 class VerbModule(Protocol):
@@ -81,7 +80,7 @@ def main(arguments: list[str] | None = None) -> int:
             finally:
                 sys.stdout.flush()  # a reader that has gone shows here, not at exit
     except KeyboardInterrupt as interrupt:
-        return EXIT_SIGNAL + getattr(interrupt, "number", signal.SIGINT)
+        return lifetime.EXIT_SIGNAL + getattr(interrupt, "number", signal.SIGINT)
     except BrokenPipeError:
         lifetime.abandon_output()
         return EXIT_BROKEN_PIPE
@@ -116,7 +115,7 @@ def require(*packages: str) -> None:
 
 def entry() -> NoReturn:
     """Be the `lira` command: run it and end the process."""
-    lifetime.leave(main())
+    lifetime.process(main)
 
 
 def dispatch(words: list[str], program: str) -> int:

@@ -10,7 +10,8 @@ from lira.hal.bus.endpoint import DEFAULT_ENDPOINT, DEFAULT_ROBOT
 from lira.hal.messages import CameraInfo
 from lira.hal.port import Arena, Robot
 from lira.hal.safety.governed import GovernedRobot
-from lira.hal.server.server import HalServer, stop_on_signal
+from lira.hal.server.server import HalServer
+from lira.hal.signals import stop_on_signal
 
 
 def serve(

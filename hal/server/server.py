@@ -1,11 +1,8 @@
 """The HAL server: puts one robot on the bus, in real time or in lockstep, and stops it before anything else."""
 
-import signal
 import sys
 import threading
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
-from types import FrameType
+from collections.abc import Callable
 
 import msgspec
 
@@ -157,22 +154,3 @@ class _Crew:
     def raise_first_failure(self) -> None:
         if self._failures:
             raise self._failures[0]
-
-
-@contextmanager
-def stop_on_signal() -> Iterator[threading.Event]:
-    """Give an event that SIGTERM, Ctrl-C and a lost terminal set, for the main thread of a process that serves."""
-    stop = threading.Event()
-
-    def handle(number: int, frame: FrameType | None) -> None:  # noqa: ARG001 - the signature is Python's
-        stop.set()
-
-    numbers = [signal.SIGTERM, signal.SIGINT]
-    if signal.getsignal(signal.SIGHUP) is not signal.SIG_IGN:  # as nohup has it
-        numbers.append(signal.SIGHUP)
-    before = [signal.signal(number, handle) for number in numbers]
-    try:
-        yield stop
-    finally:
-        for number, handler in zip(numbers, before, strict=True):
-            signal.signal(number, handler)

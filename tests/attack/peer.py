@@ -1,7 +1,7 @@
 """Peers in processes of their own: `peer.py drive NAME ENDPOINT LOG`, `peer.py flood NAME ENDPOINT SIZE KEY...`,
 `peer.py ask NAME ENDPOINT SIZE KEY...`.
 
-The driver notes the time of every command just before it sends it.
+The driver notes the time of every command just before it sends it. The others begin at SIGUSR1.
 """
 
 import itertools
@@ -54,7 +54,6 @@ def flood(name, endpoint, size, *keys):
         for key in keys
     ]
     payload = b"\x00\x01\x00\x00" + b"\x7f" * (int(size) - 4)
-    print("floods", flush=True)
     for publisher in itertools.cycle(publishers):
         publisher.put(payload)
 
@@ -62,7 +61,6 @@ def flood(name, endpoint, size, *keys):
 def ask(name, endpoint, size, *keys):
     """Ask without waiting for any answer."""
     session = _session(name, endpoint)
-    print("asks", flush=True)
     for key in itertools.cycle(keys):
         session.get(f"{name}/{key}", RingChannel(1), payload=b"x" * int(size), timeout=2.0)
 
@@ -70,10 +68,13 @@ def ask(name, endpoint, size, *keys):
 def _session(name, endpoint):
     os.nice(10)  # an attacker is another machine, and takes no time of the robot's processor
     bus = Bus(name, connect=endpoint)
-    time.sleep(1.0)  # until it is up, on both links
+    time.sleep(0.5)  # until it is up, on both links
+    print("waits", flush=True)
+    signal.sigwait({signal.SIGUSR1})
     return bus._session
 
 
 if __name__ == "__main__":
     signal.alarm(LIFE_S)  # whatever becomes of the test
+    signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGUSR1})  # before there are threads, which inherit it
     {"drive": drive, "flood": flood, "ask": ask}[sys.argv[1]](*sys.argv[2:])

@@ -38,11 +38,11 @@ class Scene:
         return self._start(["peer.py", "drive", self.name, self.endpoint, str(log)], "drives"), log
 
     def attackers(self, attacks):
-        """Start one for each, all at once, so that none has the robot to itself for long."""
+        """Start one for each, side by side: connected, they wait until they may `begin`."""
         peers = [["peer.py", how, self.name, self.endpoint, str(size), *keys] for how, size, keys in attacks]
         started = [self._launch(words) for words in peers]
-        for child, (how, *_) in zip(started, attacks, strict=True):
-            child.wait_ready({"ask": "asks", "flood": "floods"}[how], READY_S)
+        for child in started:
+            child.wait_ready("waits", READY_S)
         return started
 
     def _start(self, words, ready):
@@ -76,6 +76,10 @@ class Scene:
         """The most that the robot's process ever had in memory."""
         status = Path(f"/proc/{self.robot.pid}/status").read_text()
         return int(status.split("VmHWM:")[1].split()[0]) / 1024
+
+
+def begin(attacker):
+    attacker.signal(signal.SIGUSR1)
 
 
 def kill(process):

@@ -14,7 +14,8 @@ from tempfile import TemporaryDirectory
 from lira.hal.bus.bus import Bus
 from lira.hal.profile import load_profile
 from lira.hal.safety.governed import GovernedRobot
-from lira.hal.server.server import HalServer, stop_on_signal
+from lira.hal.server.server import HalServer
+from lira.hal.signals import stop_on_signal
 from lira.hal.testing import NullRobot
 
 PROFILE = load_profile("thesis-sim")

@@ -20,7 +20,8 @@ from lira.sim_backend.emulators.core2 import Core2Unit, Firmware
 from lira.sim_backend.emulators.rplidar import RplidarUnit
 from lira.sim_backend.emulators.wire import Wire
 from lira.tools.calibration import CalibrationError, Way
-from lira.tools.cli import EXIT_SIGNAL, main
+from lira.tools.cli import main
+from lira.tools.launch.lifetime import EXIT_SIGNAL
 from lira.tools.launch.processes import ChildProcess, lira_command
 from lira.tools.verbs.robots import calibrate
 

@@ -273,7 +273,7 @@ def test_what_is_missing_or_no_lidar_is_named(tmp_path):
 SCAN_FOR_EVER = """
 import sys, threading
 from lira.hal.profile import load_profile
-from lira.hal.server.server import stop_on_signal
+from lira.hal.signals import stop_on_signal
 from lira.robot.rplidar.device import RPLidar
 from lira.robot.settings import LidarSettings
 with stop_on_signal() as stop:

@@ -91,9 +91,9 @@ def test_a_thread_that_writes_in_vain_ends_the_process_with_what_it_met():
 
 
 def test_a_process_with_a_dead_link_leaves_without_waiting_for_it_and_tidies_up(tmp_path):
-    code = "import sys, tempfile, threading, time; from lira.tools.launch.lifetime import leave\n"
+    code = "import sys, tempfile, threading, time; from lira.tools.launch.lifetime import process\n"
     code += f"folder = tempfile.TemporaryDirectory(dir={str(tmp_path)!r}); print('x')\n"
-    code += "threading.Thread(target=time.sleep, args=[60]).start(); leave(3)"
+    code += "threading.Thread(target=time.sleep, args=[60]).start(); process(lambda: 3)"
     done = subprocess.run([sys.executable, "-c", code], check=False, capture_output=True, text=True, timeout=10)
     assert (done.returncode, done.stdout) == (3, "x\n")
     assert list(tmp_path.iterdir()) == []

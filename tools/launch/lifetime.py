@@ -14,10 +14,12 @@ from types import FrameType
 from typing import NoReturn
 
 from lira.hal.errors import LiraError, StorageError
+from lira.hal.signals import asked, handling, heeded, set_from_handler
 
 PATIENCE_S = 1.5
 LOOK_S = 0.2
-# A client closes its bus within that: on a dead link it takes seconds, and `leave` does not wait for it.
+EXIT_SIGNAL = 128  # and the signal's number
+# A client closes its bus within that: on a dead link it takes seconds, and `process` does not wait for it.
 CLOSE_S = 0.5
 # What the system says when it does not take what is written, and no file is to blame that anybody has named.
 UNWRITABLE = (errno.ENOSPC, errno.EFBIG, errno.EDQUOT, errno.EIO, errno.EBADF)
@@ -36,27 +38,20 @@ class Interrupted(KeyboardInterrupt):
 def interruptible() -> Iterator[None]:
     """Let a kill, and a terminal that goes away, end what runs in the main thread as Ctrl-C does.
 
-    A server takes its signals itself (`hal.server.stop_on_signal`). What a shell told the process to ignore it ignores.
+    A server takes its signals itself (`hal.signals.stop_on_signal`). What a shell told the process to ignore, it
+    ignores.
     """
 
-    def interrupt(number: int, frame: FrameType | None) -> NoReturn:  # noqa: ARG001 - the signature is Python's
-        raise Interrupted(number)
+    def interrupt(number: int, frame: FrameType | None) -> None:  # noqa: ARG001 - the signature is Python's
+        if not asked.again():
+            raise Interrupted(number)
 
     if threading.current_thread() is not threading.main_thread():
         yield
         return
-    with _handling(interrupt, *_heeded(signal.SIGINT, signal.SIGTERM, signal.SIGHUP)):
+    asked.forget()
+    with handling(interrupt, *heeded(signal.SIGINT, signal.SIGTERM, signal.SIGHUP)):
         yield
-
-
-@contextlib.contextmanager
-def _handling(handler: Callable[[int, FrameType | None], None], *numbers: int) -> Iterator[None]:
-    before = [signal.signal(number, handler) for number in numbers]
-    try:
-        yield
-    finally:
-        for number, earlier in zip(numbers, before, strict=True):
-            signal.signal(number, earlier)
 
 
 @contextlib.contextmanager
@@ -65,23 +60,24 @@ def stop_or_interrupt() -> Iterator[threading.Event]:
 
     A robot that is away, frozen or slow keeps a client waiting for longer than a person waits for the client.
     """
-    stop, asked = threading.Event(), [int(signal.SIGINT)]
+    stop, by = threading.Event(), [int(signal.SIGINT)]
 
     def ask(number: int, frame: FrameType | None) -> None:  # noqa: ARG001 - the signature is Python's
-        asked[0] = number
-        stop.set()
-        signal.setitimer(signal.ITIMER_REAL, PATIENCE_S)
+        if not asked.again():
+            by[0] = number
+            signal.setitimer(signal.ITIMER_REAL, PATIENCE_S)
+            set_from_handler(stop)
 
     def insist(number: int, frame: FrameType | None) -> NoReturn:  # noqa: ARG001
-        raise Interrupted(asked[0])
+        raise Interrupted(by[0])
 
-    with _handling(ask, signal.SIGINT, signal.SIGTERM, *_heeded(signal.SIGHUP)):
-        before = signal.signal(signal.SIGALRM, insist)
+    asked.forget()
+    numbers = (signal.SIGINT, signal.SIGTERM, *heeded(signal.SIGHUP))
+    with handling(ask, *numbers), handling(insist, signal.SIGALRM):
         try:
             yield stop
         finally:
             signal.setitimer(signal.ITIMER_REAL, 0.0)
-            signal.signal(signal.SIGALRM, before)
 
 
 @contextlib.contextmanager
@@ -181,21 +177,27 @@ def out_of_memory(error: BaseException) -> LiraError | None:
     return LiraError("there is not enough memory", "End other programs, or raise the limit (ulimit -v).")
 
 
-def leave(status: int) -> NoReturn:
-    """End the process, with what was registered for its end, but without taking Python apart object by object.
+def process(work: Callable[[], int]) -> NoReturn:
+    """Do the work, then end the process with its status and what was registered for the end, but nothing else.
 
-    That takes seconds where PyTorch is loaded, and Python aborts when a thread comes out of zenoh meanwhile.
+    To take Python apart object by object takes seconds where PyTorch is loaded, and Python aborts when a thread comes
+    out of zenoh meanwhile. Who asks once more ends it at once.
     """
-    atexit._run_exitfuncs()
-    for stream in (sys.stdout, sys.stderr):
-        with contextlib.suppress(OSError, ValueError):
-            stream.flush()
-    os._exit(status)
+    status: int | None = None
 
+    def end(number: int, frame: FrameType | None) -> None:  # noqa: ARG001 - the signature is Python's
+        if status is None:  # the work has not begun
+            os._exit(EXIT_SIGNAL + number)
+        if not asked.again():
+            os._exit(status)
 
-def _heeded(*numbers: int) -> list[int]:
-    """Those of some signals that whoever started the process did not tell it to ignore."""
-    return [number for number in numbers if signal.getsignal(number) is not signal.SIG_IGN]
+    with handling(end, *heeded(signal.SIGINT, signal.SIGTERM, signal.SIGHUP)):
+        status = work()
+        atexit._run_exitfuncs()
+        for stream in (sys.stdout, sys.stderr):
+            with contextlib.suppress(OSError, ValueError):
+                stream.flush()
+        os._exit(status)
 
 
 def _is_pipe(number: int) -> bool:

@@ -2,11 +2,12 @@
 
 import sys
 import time
+from functools import partial
 
 import msgspec
 
 from lira.hal.errors import LiraError
-from lira.tools.launch.lifetime import leave
+from lira.tools.launch.lifetime import process
 from lira.tools.lifecycle.control import supervise
 from lira.tools.lifecycle.setup import Setup
 
@@ -27,4 +28,4 @@ def main(text: str) -> int:
 
 
 if __name__ == "__main__":
-    leave(main(sys.argv[1]))
+    process(partial(main, sys.argv[1]))

@@ -11,7 +11,7 @@ from pathlib import Path
 import msgspec
 
 from lira.hal.errors import LiraError, StorageError
-from lira.hal.server.server import stop_on_signal
+from lira.hal.signals import stop_on_signal
 from lira.tools.launch.processes import ProcessError, how_ended
 from lira.tools.lifecycle import services
 from lira.tools.lifecycle.folder import StateFolder

@@ -9,6 +9,7 @@ python -m lira.tools.lifecycle.monitor NAME HOST:PORT
 import sys
 import threading
 import time
+from functools import partial
 from typing import Any
 
 from lira.hal.bus.bus import Bus
@@ -18,7 +19,7 @@ from lira.hal.bus.topics import APPLIED, DECISION, DIAGNOSTICS, OPERATOR_ANSWER,
 from lira.hal.errors import LiraError
 from lira.hal.messages import Reason
 from lira.hal.profile import RobotProfile
-from lira.tools.launch.lifetime import leave
+from lira.tools.launch.lifetime import process
 from lira.tools.launch.notify import Notifier
 from lira.tools.lifecycle.folder import StateFolder
 from lira.tools.lifecycle.line import Line
@@ -117,4 +118,4 @@ def main(name: str, endpoint: str) -> int:
 
 
 if __name__ == "__main__":
-    leave(main(*sys.argv[1:]))
+    process(partial(main, *sys.argv[1:]))

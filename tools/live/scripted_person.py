@@ -7,7 +7,6 @@ HOST:PORT WORLD LAYOUT SPEED SKILL SEED.
 
 import itertools
 import math
-import signal
 import sys
 import threading
 import time
@@ -38,6 +37,7 @@ from lira.hal.messages import (
     Stage,
 )
 from lira.hal.profile import RobotProfile
+from lira.hal.signals import stop_on_signal
 from lira.sim_backend.catalogue import load_world
 from lira.sim_backend.foresight import Foresight
 from lira.tools.joystick.client import TeleopClient
@@ -193,23 +193,21 @@ def main() -> int:
     """Teach until the session passed, then end it."""
     one_thread()
     name, endpoint, world, layout, speed, skill, seed = sys.argv[1:8]
-    stop = threading.Event()
-    signal.signal(signal.SIGTERM, lambda *_: stop.set())
-    signal.signal(signal.SIGINT, lambda *_: stop.set())
     bus, watch = Bus(name, connect=endpoint), Bus(name, connect=endpoint, watch=True)
     client = TeleopClient(bus, watch, ANSWER_S)
     person, thumb = person_for(client.profile, world, int(layout), skill, int(seed)), Thumb(client, float(speed))
-    thread = threading.Thread(target=thumb.run, args=[stop], name="thumb")
-    thread.start()
-    print(READY, flush=True)
-    try:
-        live(thumb, watch, person, client.profile.period_s, float(speed), stop)
-    finally:
-        stop.set()
-        thread.join()
-        person.close()
-        watch.close()
-        bus.close()
+    with stop_on_signal() as stop:
+        thread = threading.Thread(target=thumb.run, args=[stop], name="thumb")
+        thread.start()
+        print(READY, flush=True)
+        try:
+            live(thumb, watch, person, client.profile.period_s, float(speed), stop)
+        finally:
+            stop.set()
+            thread.join()
+            person.close()
+            watch.close()
+            bus.close()
     return 0
 
 

@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 
 from lira.hal.messages import Odometry
-from lira.hal.server.server import stop_on_signal
+from lira.hal.signals import stop_on_signal
 from lira.sim_backend.emulators.core2 import Core2Unit, Firmware
 from lira.sim_backend.emulators.rplidar import RplidarUnit
 from lira.sim_backend.emulators.rplidar_models import DENSE_MODE, STANDARD_MODE, ULTRA_MODE, Model

@@ -22,7 +22,8 @@ from lira.hal.messages.compression import compress
 from lira.hal.port import Robot
 from lira.hal.profile import RobotProfile, load_profile
 from lira.hal.safety.governed import GovernedRobot
-from lira.hal.server.server import HalServer, stop_on_signal
+from lira.hal.server.server import HalServer
+from lira.hal.signals import stop_on_signal
 from lira.hal.testing import small_pictures
 from lira.robot.ros2.robot import Interface, Ros2Robot
 from lira.robot.rosbot import Devices, Rosbot

@@ -21,7 +21,7 @@ from lira.hal.messages import STOP, Image, LaserScan, Odometry, Twist
 from lira.hal.messages.codec import decode, encode
 from lira.hal.messages.compression import compress
 from lira.hal.profile import RobotProfile, load_profile
-from lira.hal.server.server import stop_on_signal
+from lira.hal.signals import stop_on_signal
 from lira.hal.testing import small_pictures
 from lira.tools.stop_test.control import listen
 from lira.tools.stop_test.journal import JournalWriter, Truth, Wheels

@@ -17,7 +17,7 @@ import numpy as np
 
 from lira.hal.messages import Command, Episode, Twist
 from lira.hal.profile import load_profile
-from lira.hal.server.server import stop_on_signal
+from lira.hal.signals import stop_on_signal
 from lira.hal.testing import small_pictures
 from lira.robot.core2.rosserial import ASK_TOPICS
 from lira.sim_backend.emulators.wired_twin import WiredTwin

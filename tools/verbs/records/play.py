@@ -51,7 +51,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Play it to its end."""
-    from lira.hal.server.server import stop_on_signal
+    from lira.hal.signals import stop_on_signal
     from lira.tools.recording.reader import Recording
 
     if args.robot and (args.step or args.since):

@@ -42,7 +42,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Record until told to stop."""
-    from lira.hal.server.server import stop_on_signal
+    from lira.hal.signals import stop_on_signal
     from lira.tools.output.say import say
 
     if args.recover is not None:

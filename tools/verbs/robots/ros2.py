@@ -154,7 +154,7 @@ def run(args: argparse.Namespace) -> int:
 
 def run_offer(args: argparse.Namespace) -> int:
     """Offer a robot of ours to ROS until told to stop."""
-    from lira.hal.server.server import stop_on_signal
+    from lira.hal.signals import stop_on_signal
     from lira.tools.ros2.graph import graph_of
     from lira.tools.ros2.offer import offer
 

@@ -135,7 +135,7 @@ def run(args: argparse.Namespace) -> int:
 def run_wire(args: argparse.Namespace, profile: "RobotProfile", world: "World") -> int:
     """Be the robot's devices until told to stop."""
     from lira.hal.bus.bus import Bus
-    from lira.hal.server.server import stop_on_signal
+    from lira.hal.signals import stop_on_signal
     from lira.sim_backend.emulators.rplidar_models import MODELS
     from lira.sim_backend.emulators.wired_twin import WiredTwin, sweeping
     from lira.sim_backend.twin import Twin
