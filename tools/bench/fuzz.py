@@ -82,7 +82,7 @@ def attack(target: Target, inputs: int, chance: random.Random) -> Row:
     accepted, slowest_s = 0, 0.0
     for _ in range(inputs):
         data = spoil(chance.choice(target.valid), chance) if chance.random() < 0.5 else garbage(chance)
-        began_s = time.perf_counter()
+        began_s = time.thread_time()
         try:
             target.decode(data)
             accepted += 1
@@ -90,7 +90,7 @@ def attack(target: Target, inputs: int, chance: random.Random) -> Row:
             pass
         except Exception as error:
             raise AssertionError(f"{target.name}: {type(error).__name__} on {data.hex()}") from error
-        slowest_s = max(slowest_s, time.perf_counter() - began_s)
+        slowest_s = max(slowest_s, time.thread_time() - began_s)
     if slowest_s > SLOW_S:
         raise AssertionError(f"{target.name}: an input took {slowest_s:.2f} s")
     return {
