@@ -59,7 +59,7 @@ class BreakableTwin(NotedTwin):
     _held: Observation | None = None
 
     def __init__(self, profile: RobotProfile, journal: JournalWriter) -> None:
-        super().__init__(profile, "line", realtime_factor=1.0, renderer="tiny")
+        super().__init__(profile, "line", realtime_factor=1.0, renderer="sketch")
         self.journal = journal
 
     def read(self) -> Observation:

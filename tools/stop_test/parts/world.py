@@ -121,7 +121,7 @@ class Devices(WiredTwin):
 
 def main(profile_name: str, journal_folder: str, control_port: int, folder: str) -> None:
     """Be the devices until told to stop."""
-    twin = NotedTwin(small_pictures(load_profile(profile_name)), "corridor", realtime_factor=1.0, renderer="tiny")
+    twin = NotedTwin(small_pictures(load_profile(profile_name)), "corridor", realtime_factor=1.0, renderer="sketch")
     twin.journal = JournalWriter(Path(journal_folder), "world")
     devices = Devices(twin, Path(folder))
     try:
