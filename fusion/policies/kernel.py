@@ -54,10 +54,14 @@ Numbers = NDArray[np.int64]
 
 
 class KernelSettings(Table, frozen=True):
-    """Length scales, noise and what is left out; `gain` None: calibrated. `most` bounds the examples, and the time."""
+    """Length scales, noise and what is left out; `gain` None: calibrated. `most` bounds the examples, and the time.
+
+    How far apart a trunk puts two pictures of one way is a matter of luck in its training, three times as far in one
+    expert as in another: their scale is wide, so that it suits all.
+    """
 
     length: float = 0.4  # l of every feature's part
-    lengths: tuple[tuple[str, float], ...] = ()  # of those where it is another: the feature's name, and l
+    lengths: tuple[tuple[str, float], ...] = (("image", 0.9), ("scan", 0.25))  # where it is another: the feature, and l
     noise: float = 0.1  # variance of a label of weight 1
     contradicts: float | None = 1.2  # residual of the turn that sets a label aside; None: none is
     gain: float | None = None

@@ -67,7 +67,7 @@ def test_a_kernel_s_page_and_what_drives_agree():
         "x": ridge.x,
         "y": ridge.y.astype(np.float32),
         "noise": np.full(n, KernelSettings().noise, np.float32),
-        "lengths": np.full(2, KernelSettings().length, np.float32),
+        "lengths": ridge.lengths.astype(np.float32),
         "scale": ridge.fit.scale.astype(np.float32),
         "gain": np.full(1, 1.3, np.float32),
     }

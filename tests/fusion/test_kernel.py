@@ -1,6 +1,7 @@
 """The regression: against the textbook's formulas solved at once, and what leaving out and setting aside mean."""
 
 import math
+from functools import partial
 
 import numpy as np
 import pytest
@@ -12,7 +13,8 @@ CAMERA, LIDAR = 6, 4
 SIZES = {"image": CAMERA, "scan": LIDAR}
 BOTH = parts((CAMERA, LIDAR))
 WIDTHS = np.array([0.4, 0.4]) ** 2
-PLAIN = KernelSettings(contradicts=None)
+EVEN = partial(KernelSettings, lengths=())  # one length scale for all parts
+PLAIN = EVEN(contradicts=None)
 
 
 def states(count, seed=0, spread=0.3):
@@ -95,7 +97,7 @@ def test_one_by_one_it_comes_to_what_solving_at_once_does():
 def test_it_knows_what_it_was_shown_and_stands_where_it_was_shown_nothing():
     axes = np.eye(CAMERA + LIDAR, dtype=np.float32)
     x = axes[:2] + axes[[CAMERA, CAMERA + 1]]
-    ridge = taught(x[:1], [(0.9, -0.8)], KernelSettings(noise=1e-3))
+    ridge = taught(x[:1], [(0.9, -0.8)], EVEN(noise=1e-3))
     assert ridge.act(x[0]) == pytest.approx((0.9, -0.8), abs=0.01)
     assert ridge.act(x[1]) == pytest.approx((0.0, 0.0), abs=0.01)
     known, unknown = (ridge.fit.deviation(ridge.k(each))[1] for each in x)
@@ -119,7 +121,7 @@ def test_what_is_known_of_a_state_is_forgotten_with_the_next_example():
 
 
 def test_before_any_label_it_stands():
-    ridge = KernelRidge(SIZES, KernelSettings())
+    ridge = KernelRidge(SIZES, EVEN())
     assert ridge.act(states(1)[0], ridge.gain) == (0.0, 0.0)
     assert ridge.fit.deviation(ridge.k(states(1)[0])).tolist() == [1.0, 1.0]
 
@@ -157,7 +159,7 @@ class TestSettingAside:
         """Twelve labels of one mind in much the same place, and one that turns the other way."""
         x = units(1.0 + 0.05 * states(13))
         labels = [(1.0, 0.9)] * 12 + [(1.0, -0.9)]
-        return taught(x, labels, KernelSettings(), human=human), x
+        return taught(x, labels, EVEN(), human=human), x
 
     def test_a_label_that_contradicts_all_others_leaves_the_fit_and_is_kept(self):
         ridge, x = self.scene(human=[True] * 13)
@@ -168,7 +170,7 @@ class TestSettingAside:
 
     def test_an_expert_goes_before_a_human(self):
         x = units(1.0 + 0.01 * states(2))
-        ridge = taught(x, [(1.0, 1.0), (1.0, -1.0)], KernelSettings(), human=[True, False])
+        ridge = taught(x, [(1.0, 1.0), (1.0, -1.0)], EVEN(), human=[True, False])
         assert ridge.fit.used.tolist() == [True, False]
 
     def test_it_can_be_left_off(self):
@@ -187,14 +189,14 @@ def test_the_gain_makes_up_for_turns_that_are_predicted_too_small():
 
 
 def test_a_gain_that_is_set_is_used():
-    assert taught(states(4), actions(4), KernelSettings(gain=1.4)).gain == 1.4
+    assert taught(states(4), actions(4), EVEN(gain=1.4)).gain == 1.4
 
 
 def test_where_there_are_too_many_the_expert_s_label_goes_that_the_others_say_best():
     x = states(8)
     labels = [(1.0, 0.0)] * 4 + [(1.0, 0.9), (0.2, -0.9), (1.0, 0.0), (1.0, 0.0)]
     human = [False, False, False, False, True, True, False, True]
-    ridge = taught(x, labels, KernelSettings(contradicts=None, most=6), human=human)
+    ridge = taught(x, labels, EVEN(contradicts=None, most=6), human=human)
     assert len(ridge) == 6
     assert [i for i in range(8) if any(np.array_equal(x[i], row) for row in ridge.x)] == ridge.labels.tolist()
     assert ridge.human.tolist().count(True) == 3
