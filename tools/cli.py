@@ -3,6 +3,7 @@
 import argparse
 import difflib
 import importlib
+import re
 import signal
 import sys
 from importlib.util import find_spec
@@ -41,6 +42,7 @@ EXTRAS = {
     "onnx": "onnx",
 }
 
+LIKE = 0.75  # how much of an option has to be right
 EXIT_ERROR = 2
 EXIT_BROKEN_PIPE = lifetime.EXIT_SIGNAL + signal.SIGPIPE
 
@@ -58,7 +60,18 @@ class VerbModule(Protocol):
 
 
 class Parser(argparse.ArgumentParser):
-    """A parser that does not keep to itself that its help cannot be written."""
+    """A parser that tells its errors as all are told, and does not keep to itself that its help cannot be written."""
+
+    def error(self, message: str) -> NoReturn:
+        """Raise `ConfigError` for words that make no sense, with the option that may have been meant."""
+        unknown = re.search(r"unrecognized arguments: (-[^\s=]+)", message)
+        near = (
+            difflib.get_close_matches(unknown[1], re.findall(r"--[\w-]+", self.format_help()), 1, LIKE)
+            if unknown
+            else []
+        )
+        meant = f"Did you mean {near[0]}? " if near else ""
+        raise ConfigError(message, f"{meant}`{self.prog} --help` explains its words.")
 
     def _print_message(self, message: str, file: "SupportsWrite[str] | None" = None) -> None:
         (file or sys.stderr).write(message)
@@ -119,7 +132,7 @@ def entry() -> NoReturn:
 
 
 def dispatch(words: list[str], program: str) -> int:
-    """Run what the words ask for. `SystemExit` (argparse: a verb's help, wrong usage) passes through."""
+    """Run what the words ask for. `SystemExit` (of a verb's help) passes through."""
     if not words or words[0] in ("-h", "--help"):
         print(overview())
         return 0

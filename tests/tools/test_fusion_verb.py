@@ -158,22 +158,23 @@ def test_an_address_or_a_name_that_is_none_is_refused(refused, words, named):
 
 
 @pytest.mark.parametrize(
-    "words",
+    ("words", "said", "meant"),
     [
-        ["drive", "camera-expert", "--seed", "-1"],
-        ["drive", "camera-expert", "--method", "lira"],
-        ["fusion"],
-        ["demo", "--layout", "x"],
-        ["demo", "--laps", "-2"],
-        ["twin", "--layout", "-1"],
-        ["train-expert", "sonar"],
+        (["drive", "camera-expert", "--seed", "-1"], "unrecognized arguments: --seed -1", ""),
+        (["drive", "camera-expert", "--method", "lira"], "unrecognized arguments: --method lira", ""),
+        (["fusion"], "the following arguments are required", ""),
+        (["demo", "--layout", "x"], "argument --layout", ""),
+        (["demo", "--laps", "-2"], "argument --laps", ""),
+        (["demo", "--word=race"], "unrecognized arguments: --word=race", "Did you mean --world? "),
+        (["twin", "--layout", "-1"], "argument --layout", ""),
+        (["train-expert", "sonar"], "argument expert: invalid choice: 'sonar'", ""),
+        (["keys", "--nam", "x"], "argument ACTION: invalid choice", ""),
     ],
 )
-def test_words_that_make_no_sense_are_refused_with_the_usage(capsys, words):
-    with pytest.raises(SystemExit) as stopped:
-        cli.main(words)
-    assert stopped.value.code == 2
-    assert f"usage: lira {words[0]}" in capsys.readouterr().err
+def test_words_that_make_no_sense_are_refused_in_two_lines(refused, words, said, meant):
+    what, remedy = refused(*words)
+    assert what.startswith(f"lira {words[0]}: {said}")
+    assert remedy.strip().startswith(f"{meant}`lira {words[0]} --help`")
 
 
 def test_the_demo_refuses_what_is_no_proof_before_it_starts_anything(refused):

@@ -118,12 +118,13 @@ def robot_plan(args: argparse.Namespace, target: "Target") -> tuple["Plan", "Fac
 
 def robot_setup(args: argparse.Namespace) -> "Setup":
     """The robot's set-up, its words read as its verb reads them. Raises `ConfigError`."""
+    from lira.tools.cli import Parser
     from lira.tools.lifecycle.setup import Setup
     from lira.tools.verbs.robots import robot
 
     if not args.words:
         raise ConfigError("no words for `lira robot`", "Give them after --, as in: -- --base /dev/core2 ...")
-    parser = argparse.ArgumentParser(prog="lira deploy robot --", allow_abbrev=False)
+    parser = Parser(prog="lira deploy robot --", allow_abbrev=False)
     robot.add_arguments(parser)
     robot.check_devices(parser.parse_args(args.words))
     listen = args.listen or (DEFAULT_ENDPOINT if args.keys is None else EVERYWHERE)
