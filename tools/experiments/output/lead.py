@@ -45,15 +45,15 @@ Those that had just reached 90 %, on the same 12 layouts, as they are, behind th
 and with somebody to ask: layouts passed, and collisions.
 """
 WITH_ASKING = """
-The same of {seeds} seeds in all ways; who asks stops for it: `{command}`
+The same of {seeds} seeds in all ways; who asks stops for it: `{command}`{played}
 """
 MORE = """
 Novices as they were when they had been proven, and after five more laps of teaching, on the same layouts:
-`{command}`
+`{command}`{played}
 """
 ELSEWHERE = """
 The same where the world, the teacher, or the robot is another one than so far; a shift is applied when the novice is
-tried, not while it is taught.
+tried, not while it is taught. What was played with an earlier version has the settings of that one.
 """
 
 
@@ -65,7 +65,7 @@ def lead(summaries: Sequence[Summary]) -> str:
         return HEAD + NOT_YET
     here = (ALL_WAYS, TAUGHT_ON)
     elsewhere = [each for name, each in found.items() if name.startswith(f"{LED_BY}-") and name not in here]
-    played = f"{main.trials} trials, played with {main.commit}" if main.commit else f"{main.trials} trials"
+    played = f"{main.trials} trials{played_with(main)}"
     parts = [
         HEAD,
         f"\n`{main.command}`: {played}; all tables are in [unseen](docs/results/unseen.md).\n{EFFORT}\n",
@@ -75,17 +75,22 @@ def lead(summaries: Sequence[Summary]) -> str:
         f"\n## Deployed\n{DEPLOYED}\n" + table(deployed(main)),
     ]
     if ways := found.get(ALL_WAYS):
-        parts.append(WITH_ASKING.format(seeds=ways.seeds, command=ways.command) + "\n" + table(deployed(ways)))
+        words = WITH_ASKING.format(seeds=ways.seeds, command=ways.command, played=played_with(ways))
+        parts.append(f"{words}\n" + table(deployed(ways)))
     if more := found.get(TAUGHT_ON):
-        words = MORE.format(command=more.command)
+        words = MORE.format(command=more.command, played=played_with(more))
         parts.append(f"\n## Taught on\n{words}\n" + table(taught_on(more)))
     if elsewhere:
         parts.append(f"\n## Elsewhere\n{ELSEWHERE}\n" + table([row for each in elsewhere for row in condition(each)]))
     if PARTS in found and found[PARTS].quality:
-        parts.append(
-            f"\n## What each part of plus is worth\n\n`{found[PARTS].command}`\n\n" + table(effort(found[PARTS]))
-        )
+        words = f"`{found[PARTS].command}`{played_with(found[PARTS])}"
+        parts.append(f"\n## What each part of plus is worth\n\n{words}\n\n" + table(effort(found[PARTS])))
     return "".join(parts)
+
+
+def played_with(summary: Summary) -> str:
+    """Of which version it is, in words that follow others."""
+    return f", played with {summary.commit}" if summary.commit else ""
 
 
 def rows_of(summary: Summary, title: str) -> list[list[Row]]:
@@ -151,6 +156,7 @@ def condition(summary: Summary) -> list[Row]:
             **{key: row[key] for key in ("method", "runs", "censored", "labels: median, 90 %, worst", "interventions")},
             "unseen passed": row["unseen passed"],
             "collisions per 100 m": row["collisions per 100 m"],
+            "played with": summary.commit,
         }
         for row in effort(summary)
     ]
