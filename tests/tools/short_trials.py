@@ -1,4 +1,4 @@
-"""Real trials that take seconds: eight metres of line, one box, a teacher without faults, one lap."""
+"""Real trials that take seconds: six metres of line, one box, a teacher without faults, one lap."""
 
 import msgspec
 
@@ -8,14 +8,14 @@ from lira.fusion.teaching.teacher import PERFECT
 from lira.tools.experiments.trial import Preset, Trial
 
 SHORT = """
-description = "Eight metres of line with one box on it"
+description = "Six metres of line with one box on it"
 [line]
-pieces = [{ straight_m = 12.0 }]
+pieces = [{ straight_m = 9.0 }]
 [[box]]
-x_m = 5.0
+x_m = 3.4
 y_m = 0.1
 [limits]
-finish_m = 8.0
+finish_m = 5.8
 lost_m = 1.5
 """
 

@@ -169,7 +169,7 @@ def test_the_fingerprint_follows_the_world_and_the_experts(world, monkeypatch, t
     fingerprint.cache_clear()
     assert fingerprint(world, "line") == before
     text = Path(world).read_text()
-    Path(world).write_text(text.replace("x_m = 5.0", "x_m = 5.1"))
+    Path(world).write_text(text.replace("x_m = 3.4", "x_m = 3.5"))
     fingerprint.cache_clear()
     assert fingerprint(world, "line") != before
     Path(world).write_text("# a comment\n" + text)
