@@ -11,6 +11,7 @@ from lira.tools.launch.processes import ChildProcess, free_port
 
 HERE = Path(__file__).parent
 READY_S = 60.0
+BUDGET_S = 0.35  # within which the wheels stop
 
 
 class Scene:

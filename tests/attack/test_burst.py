@@ -5,10 +5,9 @@ import signal
 import time
 
 import pytest
-from scene import Scene
+from scene import BUDGET_S, Scene
 
 BURST_S = 0.2
-BUDGET_S = 0.35
 ENDS_S = 10.0
 
 

@@ -3,7 +3,7 @@
 import time
 
 import pytest
-from scene import Scene, begin, kill, moved_on_s
+from scene import BUDGET_S, Scene, begin, kill, moved_on_s
 
 from lira.hal.bus.bus import Bus
 from lira.hal.bus.services import ask_info
@@ -11,7 +11,6 @@ from lira.hal.bus.topics import CMD_VEL, ESTOP_PRESS, ESTOP_RELEASE, INFO, RESET
 from lira.tools.stop_test.starved import longest_s, waits_s
 
 FLOOD_S = 0.7
-BUDGET_S = 0.35
 ATTEMPTS = 3  # the attackers take the robot's processors, too, which on a robot nobody does
 STARVED_S = 0.02
 MEMORY_MB = 300

@@ -9,8 +9,8 @@ def test_control_is_measured_beside_a_recorder_and_without_one(monkeypatch):
     for name, value in {"TURNS": 1, "WARM_UP_S": 0.5}.items():
         monkeypatch.setattr(record, name, value)
     (row,) = record.run(0.05)
+    assert row["lost"] == 0
     assert row["messages"] > 100
-    assert row["lost"] < 0.02 * row["messages"]  # beside other tests a picture may be late; whole runs lose none
     assert row["cpu_share"] > 0.0
     for half in ("", "recorded_"):
         assert 0.0 < row[f"{half}p50_ms"] <= row[f"{half}p99_ms"]

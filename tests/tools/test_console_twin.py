@@ -85,6 +85,8 @@ def test_a_person_teaches_with_the_keyboard_alone(tmp_path):
             with suppress(AssertionError):
                 newest(decisions, lambda d: d.training_steps >= 1, READY_S / PUSHES)
                 break
+        else:
+            pytest.fail(learner.output())
         hand.hold()
         assert newest(decisions, lambda d: d.driver != "human").human is None
         hand.hold("p")

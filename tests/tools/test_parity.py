@@ -270,5 +270,5 @@ def test_the_twin_and_its_wire_behave_alike(tmp_path, capsys, monkeypatch):
     for name in ("left: turn rate", "lidar: rate", "scans from one place: median", "pictures from one place, of 255"):
         assert rows[name]["verdict"] == SAME, rows[name]
     for name in ("left: until it turns", "left: rise, 10 to 90 %"):
-        assert abs(rows[name]["difference"]) < 0.5, rows[name]
+        assert abs(rows[name]["difference"]) < 0.3, rows[name]
     assert (out / "parity.html").exists()

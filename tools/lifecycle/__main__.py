@@ -2,7 +2,6 @@
 
 import sys
 import time
-from functools import partial
 
 import msgspec
 
@@ -28,4 +27,4 @@ def main(text: str) -> int:
 
 
 if __name__ == "__main__":
-    process(partial(main, sys.argv[1]))
+    process(lambda: main(sys.argv[1]))

@@ -9,7 +9,6 @@ python -m lira.tools.lifecycle.monitor NAME HOST:PORT
 import sys
 import threading
 import time
-from functools import partial
 from typing import Any
 
 from lira.hal.bus.bus import Bus
@@ -118,4 +117,4 @@ def main(name: str, endpoint: str) -> int:
 
 
 if __name__ == "__main__":
-    process(partial(main, *sys.argv[1:]))
+    process(lambda: main(*sys.argv[1:]))
