@@ -12,6 +12,7 @@ from torch import Tensor, nn
 from lira.fusion.inference.architecture import Weights
 from lira.fusion.inference.networks import DrivingNet
 from lira.fusion.learning.adam import Adam
+from lira.fusion.learning.allocator import keep_freed_memory
 from lira.fusion.learning.heads import Heads
 from lira.fusion.learning.label_store import FileRows
 from lira.fusion.learning.labels import Label, mirror
@@ -55,6 +56,8 @@ class Learner:
                 trunk.requires_grad_(False)
             elif isinstance(trunk, PictureTrunk):
                 trunk.reduced_precision = _has_bfloat16()
+        if not frozen_trunks:
+            keep_freed_memory()
         self._frozen_trunks = frozen_trunks
         self._mirrored = mirrored
         self._batch, self._updates = batch, updates

@@ -55,7 +55,24 @@ class PictureTrunk(nn.Module):
         with torch.autocast("cpu", torch.bfloat16, enabled=self.reduced_precision):
             hidden = leaky_relu(self.conv1(image.unsqueeze(1)), SLOPE, inplace=True)
             # Pooled before the rectifier: it is monotonic, so the result is the same for a quarter of the work.
-            return leaky_relu(max_pool2d(self.conv2(hidden), 2), SLOPE, inplace=True).flatten(1).float()
+            pooled = leaky_relu(max_pool2d(self.conv2(hidden), 2), SLOPE, inplace=True)
+        return _SlopeInOrder.apply(pooled).flatten(1).float()  # type: ignore[no-any-return,no-untyped-call]
+
+
+class _SlopeInOrder(torch.autograd.Function):
+    """A picture's features as they are. Their slope, which comes back channel by channel from what is flat, is brought
+    into the order in memory that they have: with two orders the rectifier takes twenty times as long.
+    """
+
+    @staticmethod
+    def forward(_: Any, pooled: Tensor) -> Tensor:
+        """Features [n, filters, h, w], channels last."""
+        return pooled.view_as(pooled)
+
+    @staticmethod
+    def backward(_: Any, slope: Tensor) -> Tensor:
+        """Their slope, channels last, too."""
+        return slope.contiguous(memory_format=torch.channels_last)
 
 
 class ScanTrunk(nn.Module):
