@@ -1,5 +1,8 @@
 """One tree of errors. Each says what is wrong and what to do about it; the `lira` command prints both."""
 
+import difflib
+from collections.abc import Iterable
+
 
 class LiraError(Exception):
     """Root of everything this project raises on purpose.
@@ -49,3 +52,9 @@ class MissingExtraError(LiraError):
 
     def __init__(self, package: str, extra: str) -> None:
         super().__init__(f"{package} is not installed", f"Install it with: pip install 'lira-rosbot[{extra}]'")
+
+
+def did_you_mean(word: str, known: Iterable[str], alike: float = 0.6) -> str:
+    """Return the question whether the nearest of the known words was meant, empty if none is as much `alike`."""
+    near = difflib.get_close_matches(word, known, n=1, cutoff=alike)
+    return f"Did you mean `{near[0]}`?" if near else ""

@@ -1,12 +1,11 @@
 """What is wrong with a file that somebody wrote, in words, and what would be right: msgspec's errors for people."""
 
-import difflib
 import re
 from typing import Any
 
 from msgspec import inspect
 
-from lira.hal.errors import ConfigError
+from lira.hal.errors import ConfigError, did_you_mean
 
 COMPARE = "Compare the file with the ones that come with the project."
 KINDS = {
@@ -51,10 +50,7 @@ def _kinds(names: re.Match[str]) -> str:
 
 def _suggestion(key: str, known: list[str]) -> str:
     """The key that was meant, if there is one like it, or those that there are."""
-    like = difflib.get_close_matches(key, known, 1)
-    if like:
-        return f"Did you mean `{like[0]}`?"
-    return f"Known here: {', '.join(known)}." if known else ""
+    return did_you_mean(key, known) or (f"Known here: {', '.join(known)}." if known else "")
 
 
 def _keys_at(kind: Any, place: str) -> list[str]:

@@ -2,10 +2,14 @@
 
 import ast
 import re
+import sys
 from functools import cache
 from pathlib import Path
 
 import pytest
+
+from lira.tools.cli import EXTRAS
+from lira.tools.doctor.machine import BASE
 
 ROOT = Path(__file__).parent.parent
 MAY_IMPORT = {
@@ -52,6 +56,7 @@ ROOMS = {
     },
 }
 MOST_MODULES = 16  # in one folder
+NOT_INSTALLED = {"_typeshed", "pytest"}  # for the type checker; whoever loads our plug-in is it
 NOT_ON_THE_ROBOT = {"torch", "pybullet", "pygame", "safetensors", "matplotlib"}
 
 
@@ -92,6 +97,13 @@ def test_packages_import_only_what_the_table_allows(package):
     for path in modules(package):
         ours = {name.split(".")[1] for name in imports(path) if name.startswith("lira.")}
         assert ours <= MAY_IMPORT[package], f"{shown(path)} imports {ours - MAY_IMPORT[package]}"
+
+
+@pytest.mark.parametrize("package", MAY_IMPORT)
+def test_what_only_a_part_of_the_installation_has_is_known_as_such(package):
+    known = {name.split(".")[0] for name in (*BASE, *EXTRAS)} | sys.stdlib_module_names | NOT_INSTALLED | {"lira"}
+    for path in modules(package):
+        assert foreign(path) <= known, f"{shown(path)}: {foreign(path) - known} is in no table; see tools/cli.py"
 
 
 @pytest.mark.parametrize("package", MAY_IMPORT)

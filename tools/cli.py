@@ -1,7 +1,6 @@
 """The `lira` command: finds the verb, runs it, and tells in two lines what went wrong."""
 
 import argparse
-import difflib
 import importlib
 import re
 import signal
@@ -9,7 +8,7 @@ import sys
 from importlib.util import find_spec
 from typing import TYPE_CHECKING, NoReturn, Protocol, cast
 
-from lira.hal.errors import ConfigError, LiraError, MissingExtraError
+from lira.hal.errors import ConfigError, LiraError, MissingExtraError, did_you_mean
 from lira.hal.plugins import blame
 from lira.tools.launch import lifetime
 from lira.tools.verbs import GROUPS, VERBS, Verb
@@ -25,6 +24,9 @@ EXTRAS = {
     "openni": "robot",
     "av": "video",
     "joblib": "experiment",
+    "matplotlib": "experiment",
+    "tqdm": "experiment",
+    "distributed": "experiment",
     "aiohttp": "web",
     "segno": "web",
     "torch": "learn",
@@ -65,13 +67,8 @@ class Parser(argparse.ArgumentParser):
     def error(self, message: str) -> NoReturn:
         """Raise `ConfigError` for words that make no sense, with the option that may have been meant."""
         unknown = re.search(r"unrecognized arguments: (-[^\s=]+)", message)
-        near = (
-            difflib.get_close_matches(unknown[1], re.findall(r"--[\w-]+", self.format_help()), 1, LIKE)
-            if unknown
-            else []
-        )
-        meant = f"Did you mean {near[0]}? " if near else ""
-        raise ConfigError(message, f"{meant}`{self.prog} --help` explains its words.")
+        meant = did_you_mean(unknown[1], re.findall(r"--[\w-]+", self.format_help()), LIKE) if unknown else ""
+        raise ConfigError(message, f"{meant} `{self.prog} --help` explains its words.".lstrip())
 
     def _print_message(self, message: str, file: "SupportsWrite[str] | None" = None) -> None:
         (file or sys.stderr).write(message)
@@ -164,9 +161,8 @@ def find_verb(name: str) -> Verb:
     """Look a verb up. Raises `ConfigError` that names the nearest one."""
     if name in VERBS:
         return VERBS[name]
-    near = difflib.get_close_matches(name, VERBS, n=1, cutoff=0.5)
-    remedy = f"Did you mean '{near[0]}'? " if near else ""
-    raise ConfigError(f"unknown verb '{name}'", f"{remedy}Verbs: {', '.join(VERBS)}.")
+    meant = did_you_mean(name, VERBS)
+    raise ConfigError(f"unknown verb '{name}'", f"{meant} Verbs: {', '.join(VERBS)}.".lstrip())
 
 
 def overview() -> str:

@@ -53,7 +53,7 @@ def test_an_unknown_verb_names_the_nearest(capsys):
     assert cli.main(["twinn"]) == 2
     error = capsys.readouterr().err
     assert error.splitlines()[0] == "lira: unknown verb 'twinn'"
-    assert "Did you mean 'twin'?" in error
+    assert "Did you mean `twin`?" in error
 
 
 def test_an_unknown_verb_like_no_other_gets_the_list(capsys):

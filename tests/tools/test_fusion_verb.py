@@ -165,7 +165,7 @@ def test_an_address_or_a_name_that_is_none_is_refused(refused, words, named):
         (["fusion"], "the following arguments are required", ""),
         (["demo", "--layout", "x"], "argument --layout", ""),
         (["demo", "--laps", "-2"], "argument --laps", ""),
-        (["demo", "--word=race"], "unrecognized arguments: --word=race", "Did you mean --world? "),
+        (["demo", "--word=race"], "unrecognized arguments: --word=race", "Did you mean `--world`? "),
         (["twin", "--layout", "-1"], "argument --layout", ""),
         (["train-expert", "sonar"], "argument expert: invalid choice: 'sonar'", ""),
         (["keys", "--nam", "x"], "argument ACTION: invalid choice", ""),

@@ -16,7 +16,7 @@ from lira.tools.doctor.finding import Finding, Patient, fail, ok, warn
 OLDEST, NEWEST = (3, 11), (3, 14)
 WHEELS = {"x86_64", "aarch64"}  # of processors for which every package has one
 LIBC = (2, 28)  # that wheels are built for
-BASE = ("zenoh", "msgspec", "numpy", "cv2", "rosbags")
+BASE = ("zenoh", "msgspec", "numpy", "cv2", "rosbags", "ruamel.yaml")
 TIGHT_BYTES, LITTLE_BYTES = 200e6, 2e9  # of disk
 SMALL_BYTES = 400e6  # of memory
 ASLEEP_S, NAPS = 0.002, 200

@@ -23,6 +23,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from lira.hal.errors import ConfigError
+from lira.tools.cli import require
 from lira.tools.experiments.registry import REGISTRY, load, words_of
 from lira.tools.options import add_json, add_randomise, natural, positive
 
@@ -85,6 +86,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Run the trials that are missing and print the tables."""
+    require("joblib", "matplotlib", "tqdm", *(["distributed"] if args.scheduler else []))
     from lira.tools.experiments.output.summary import to_json
     from lira.tools.output.machine import output_for, tell
 
