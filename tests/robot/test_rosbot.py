@@ -1,6 +1,7 @@
 import math
 import time
 from contextlib import contextmanager
+from itertools import pairwise
 
 import msgspec
 import pytest
@@ -71,6 +72,18 @@ def get_going(robot, seconds=0.3):
         if keep(robot, GO, seconds).twist == GO:
             return
     raise AssertionError("it does not get going")
+
+
+def drives_through(robot, fault):
+    """Whether it goes on driving through a fault. Where a busy machine makes this hand pause, it begins again."""
+    for _ in range(10):
+        get_going(robot)
+        fault()
+        at_s = []
+        drove = drives(keep(robot, GO, 0.6, lambda _, at_s=at_s: at_s.append(time.monotonic())))
+        if drove or max(after - before for before, after in pairwise(at_s)) < PROFILE.control.robot_timeout_s / 2:
+            return drove
+    raise AssertionError("this hand paused each time")
 
 
 def stops_for(robot, clamp, seconds):
@@ -181,10 +194,7 @@ def test_without_commands_the_base_stands_by_itself(tmp_path):
 
 def test_garbage_on_both_lines_does_not_stop_it(tmp_path):
     with wired(tmp_path) as bench, opened(bench, tmp_path) as robot:
-        get_going(robot)
-        for wire in (bench.lidar_wire, bench.base_wire):
-            wire.disturb(200)
-        assert keep(robot, GO, 0.6).twist == GO
+        assert drives_through(robot, lambda: [wire.disturb(200) for wire in (bench.lidar_wire, bench.base_wire)])
         assert not bench.base.crashed
 
 

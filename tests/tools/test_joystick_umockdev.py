@@ -92,18 +92,34 @@ class Rig:
         self.bed, self.process = bed, process
         self.applied, self.teleop, self.joy = Watcher(bus, APPLIED), Watcher(robot, TELEOP), Watcher(bus, JOY)
         self.asked = Watcher(bus, OPERATOR)
+        self.pushed, self.since = 128, 0
 
     def says(self, words, times=1):
         output = self.process.output
         wait_for(lambda: output().count(words) >= times, lambda: f"{words!r} not in:\n{output()}")
 
     def drives(self, linear_m_s):
+        """Wait until it does. A machine that was busy may have stopped it: then the stick goes back to rest first."""
+
         def driving():
             applied = self.applied.last()
+            if self.stalled():
+                self.bed.axis(PAD, "ABS_Y", 128)
+                wait_for(lambda: self.applied.last().reason is Reason.OK, self.process.output)
+                self.push(self.pushed)
             by_hand = applied is not None and applied.source is Source.TELEOP
             return by_hand and applied.twist.linear_m_s == pytest.approx(linear_m_s)
 
         wait_for(driving, self.process.output)
+
+    def push(self, value):
+        self.pushed, self.since = value, len(self.applied.all())
+        self.bed.axis(PAD, "ABS_Y", value)
+
+    def stalled(self):
+        """Whether the robot has missed a command since the stick was pushed."""
+        reasons = [received.message.reason for received in self.applied.all()[self.since :]]
+        return self.pushed != 128 and Reason.STALE in reasons and reasons[-1] is Reason.NEUTRAL_FIRST
 
     def stands(self):
         wait_for(lambda: (a := self.applied.last()) and a.twist == STOP, self.process.output)
@@ -113,18 +129,18 @@ class Rig:
         self.bed.key(PAD, "BTN_TL", 1)
         self.says("you drive")
         self.drives(0.0)
-        self.bed.axis(PAD, "ABS_Y", 0)
+        self.push(0)
         self.drives(0.5)
 
     def begin_again(self):
         """As `begin`, after the pad was lost."""
         self.bed.key(PAD, "BTN_TL", 1)
         self.says("you drive", times=2)
-        self.bed.axis(PAD, "ABS_Y", 0)
+        self.push(0)
         self.drives(0.5)
 
     def let_go(self):
-        self.bed.axis(PAD, "ABS_Y", 128)
+        self.push(128)
         self.bed.key(PAD, "BTN_TL", 0)
 
     def zeros_then_silence(self, released):
