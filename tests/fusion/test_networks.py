@@ -2,6 +2,7 @@ import numpy as np
 import pytest
 import torch
 from nets import camera_net, fusion_net, lidar_net
+from torch.nn.functional import leaky_relu
 
 from lira.fusion.policies.networks import ExpertNet, FusionNet, batch_of_one
 from lira.fusion.preprocess import Features
@@ -78,6 +79,22 @@ def test_one_step_is_what_a_batch_gives(network):
     action = network.driving().act(SEEN)
     np.testing.assert_allclose(action, batch[1].tolist(), atol=1e-5)
     assert all(isinstance(a, float) and -1 <= a <= 1 for a in action)
+
+
+def test_slopes_come_back_in_the_order_in_memory_of_what_they_belong_to(monkeypatch):
+    in_order = []
+
+    def rectified(x, *others, **how):
+        out = leaky_relu(x, *others, **how)
+        if out.ndim == 4:  # of a picture
+            out.register_hook(lambda slope: in_order.append(slope.stride() == out.stride()))
+        return out
+
+    monkeypatch.setattr("lira.fusion.policies.networks.leaky_relu", rectified)
+    network = fusion_net(101, 16)
+    seen = {"image": torch.rand(3, 32, 32), "scan": torch.rand(3, 101)}
+    network.features(seen).square().sum().backward()
+    assert in_order == [True, True]
 
 
 def test_an_expert_looks_at_its_own_sensor_only():
