@@ -57,11 +57,16 @@ class Rig:
         self.robot = GovernedRobot(self.rosbot)
 
     def keep(self, twist, seconds):
-        until_s = time.monotonic() + seconds
-        while time.monotonic() < until_s:
+        """Command for a while; returns the longest pause that this hand made, as it does on a busy machine."""
+        longest_s, at_s = 0.0, time.monotonic()
+        until_s = at_s + seconds
+        while at_s < until_s:
             self.robot.read()
             self.robot.drive(Command(twist, self.robot.now()))
             time.sleep(0.02)
+            before_s, at_s = at_s, time.monotonic()
+            longest_s = max(longest_s, at_s - before_s)
+        return longest_s
 
     def keep_until(self, condition, timeout_s=20.0):
         """Command on until it is so; a busy machine takes its time."""
@@ -91,12 +96,15 @@ def rig(tmp_path):
 
 @pytest.mark.parametrize("boot_s", [0.3, 0.6, 1.1, 2.0, 4.0])
 def test_a_board_that_resets_in_mid_drive_turns_no_wheel_unasked(rig, boot_s):
-    rig.get_going()
-    losses = rig.rosbot.base.losses
-    before_m = rig.wheels.travel_m
-    rig.unit.reset(boot_s)
-    rig.keep(GO, boot_s + 1.5)
-    assert rig.wheels.travel_m - before_m < BRAKING_M + 0.01
+    for _ in range(5):
+        rig.get_going()
+        losses = rig.rosbot.base.losses
+        before_m = rig.wheels.travel_m
+        rig.unit.reset(boot_s)
+        paused_s = rig.keep(GO, boot_s + 1.5)
+        assert rig.wheels.travel_m - before_m < BRAKING_M + 0.01
+        if rig.rosbot.base.losses > losses or paused_s < 0.1:  # who did not look meanwhile has missed nothing
+            break
     assert rig.rosbot.base.losses > losses
     rig.keep_until(lambda: rig.rosbot.base.answers)
     if boot_s > 0.45:  # until then it may only be the silence of a bad line, which gets zeros
