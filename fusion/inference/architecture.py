@@ -26,7 +26,8 @@ class Architecture:
 
     `kind` is the sensor whose expert it is, "fusion" or "kernel". `shapes` are those of the features it looks at, by
     name and in order; `filters` the width of the trunks that see pictures, 0 without any. `examples` is how many a
-    kernel drives by, `members` the size of the ensemble beside a novice.
+    kernel drives by, `fallback` whether it knows what its experts do where it knows nothing itself, `members` the size
+    of the ensemble beside a novice.
     """
 
     kind: str
@@ -34,6 +35,7 @@ class Architecture:
     filters: int
     examples: int = 0
     members: int = 0
+    fallback: bool = False
 
     def __post_init__(self) -> None:
         """Raises `ValueError` for what cannot be."""
@@ -77,7 +79,12 @@ class Architecture:
         seen, n = sum(self.trunk_sizes), self.examples
         if self.kind == KERNEL:
             sizes |= {"x": (n, seen), "y": (n, 2), "noise": (n,), "lengths": (len(self.shapes),)}
-            return sizes | {"scale": (2,), "gain": (1,), "limit": (1,)}
+            sizes |= {"scale": (2,), "gain": (1,), "limit": (1,)}
+            if self.fallback:
+                for trunk, size in zip(self.trunks.values(), self.trunk_sizes, strict=True):
+                    sizes |= {f"{trunk}_out.weight": (2, size), f"{trunk}_out.bias": (2,)}
+                sizes["cruise"] = (len(self.shapes), 2)
+            return sizes
         widths = (seen, FUSION_HIDDEN, FUSION_HIDDEN, 2) if self.kind == FUSION else (seen, 2)
         for name, (before, after) in zip(self.layers, pairwise(widths), strict=True):
             sizes |= {f"{name}.weight": (after, before), f"{name}.bias": (after,)}
@@ -120,6 +127,16 @@ def trunk_weights(experts: Sequence[Weighted]) -> Weights:
             below = {name.removeprefix(start): array for name, array in weights.items() if name.startswith(start)}
             seeing |= {f"{sensor}.{name}": array for name, array in below.items()}
     return seeing
+
+
+def head_weights(experts: Sequence[Weighted]) -> Weights:
+    """The weights of some experts' last layers, called as those of a novice that falls back on them."""
+    heads: Weights = {}
+    for expert in experts:
+        (feature,), weights = expert.architecture.shapes, expert.weights()
+        sensor = MODALITIES[feature].sensor
+        heads |= {f"{sensor}_out.{name}": weights[f"out.{name}"] for name in ("weight", "bias")}
+    return heads
 
 
 def check(sizes: Sizes, weights: Mapping[str, NDArray[Any]]) -> None:

@@ -1,15 +1,28 @@
-"""The novice of `policies/kernel.py` as it drives alone: the regression when nobody teaches it any more."""
+"""The novice of `policies/kernel.py` as it drives alone: the regression when nobody teaches it any more.
+
+Where it knows nothing it falls back on its experts, as far as only the first of them has anything to say: with a_1 what
+that one does if all others are quiet, else zero, it does
+
+    g m(x) + (1 - k(x)^T P k(x)) a_1
+
+so that it does not lose a line only because nobody has shown it this one. Where two experts have something to say and
+nobody has shown it whom to follow, it stands as ever.
+"""
 
 from collections.abc import Sequence
+from dataclasses import replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from lira.fusion.inference.architecture import KERNEL, Architecture, Weighted, Weights, trunk_weights
+from lira.fusion.inference.architecture import KERNEL, Architecture, Weighted, Weights, head_weights, trunk_weights
+from lira.fusion.inference.layers import Dense
 from lira.fusion.inference.networks import DrivingNet
 from lira.fusion.preprocess import Features
 from lira.hal.messages import Action, FloatArray
 
+QUIET = 0.2  # an expert less than this away from its cruise action has nothing to say, as with `hold` of LIRA-SPF
 NEVER = 1e9  # a limit that no deviation comes to; a file holds finite numbers
 _LEAST_LENGTH = np.float32(1e-12)  # a trunk that sees nothing stays zero instead of becoming nan
 
@@ -21,31 +34,41 @@ class KernelNet(DrivingNet):
 
     Its weights are the trunks' and, for n examples, `x` [n, size], `y` [n, 2] and `noise` [n], a length scale for each
     trunk, the deviations s [2] and the gain g [1], all as in `policies/kernel.py`; and the `limit` [1], the largest
-    deviation of a turn in the runs that proved it.
+    deviation of a turn in the runs that proved it. One that falls back also has its experts' last layers and their
+    `cruise` actions [experts, 2].
     """
 
     @classmethod
-    def from_experts(cls, experts: Sequence[Weighted]) -> "KernelNet":
-        """Build one that sees as the experts do and knows nothing."""
-        architecture = Architecture.novice(KERNEL, experts)
-        seeing = trunk_weights(experts)
-        of_all = {name: np.ones(size, np.float32) for name, size in architecture.weights.items() if name not in seeing}
-        return cls(architecture, seeing | of_all)
+    def from_experts(cls, experts: Sequence[Weighted], cruises: Sequence[Action] | None = None) -> "KernelNet":
+        """Build one that sees as the experts do and knows nothing; with their `cruises` it falls back on them."""
+        architecture = replace(Architecture.novice(KERNEL, experts), fallback=cruises is not None)
+        theirs = trunk_weights(experts)
+        if cruises is not None:
+            theirs |= head_weights(experts) | {"cruise": np.array(cruises, np.float32)}
+        of_all = {name: np.ones(size, np.float32) for name, size in architecture.weights.items() if name not in theirs}
+        return cls(architecture, theirs | of_all)
 
     def see(self, seen: Features) -> FloatArray:
         """x [size] of an observation."""
         return unit(self.features(seen), self._parts)
 
+    def fallback(self, seen: Features) -> FloatArray:
+        """a_1 [2] of an observation; zero for one that does not fall back."""
+        return self._fallback(self.features(seen))
+
     def head(self, features: FloatArray) -> FloatArray:
-        """m(x), the turn times g, clipped; `features` are what the trunks have made."""
-        mean = (self._k(features) @ self._a).astype(np.float32) * self._gains
-        clipped: FloatArray = np.clip(mean, np.float32(-1.0), np.float32(1.0))
+        """m(x), the turn times g, and where it knows nothing a_1, clipped; `features` are what the trunks have made."""
+        k, first = self._k(features), self._fallback(features)
+        action = (k @ self._a).astype(np.float32) * self._gains
+        if first.any():
+            action += np.float32(unknown(k, self._p)) * first
+        clipped: FloatArray = np.clip(action, np.float32(-1.0), np.float32(1.0))
         return clipped
 
     def deviation(self, seen: Features) -> Action:
         """sd(x) of the mean's two actions."""
         k = self._k(self.features(seen))
-        linear, angular = (np.sqrt(max(0.0, 1.0 - float(k @ self._p @ k))) * self._scale).tolist()
+        linear, angular = (np.sqrt(unknown(k, self._p)) * self._scale).tolist()
         return linear, angular
 
     def doubts(self, seen: Features) -> bool:
@@ -58,10 +81,26 @@ class KernelNet(DrivingNet):
             raise ValueError("a kernel without width or noise")
         self._x, self._widths = weights["x"], lengths.astype(np.float64) ** 2
         self._parts = parts(self.architecture.trunk_sizes)
-        self._p = np.linalg.inv(kernel(self._x, self._x, self._parts, self._widths) + np.diag(noise.astype(np.float64)))
+        covariance = kernel(self._x, self._x, self._parts, self._widths) + np.diag(noise.astype(np.float64))
+        self._p = np.linalg.inv(covariance)
         self._a: Doubles = self._p @ weights["y"]
         self._gains = np.array([1.0, weights["gain"][0]], np.float32)
         self._scale, self._limit = weights["scale"], float(weights["limit"][0])
+        self._heads: list[Dense] = []
+        if self.architecture.fallback:
+            self._cruises = weights["cruise"]
+            self._heads = [
+                Dense(weights[f"{trunk}_out.weight"], weights[f"{trunk}_out.bias"], rectified=False)
+                for trunk in self.architecture.trunks.values()
+            ]
+
+    def _fallback(self, features: FloatArray) -> FloatArray:
+        if not self._heads:
+            return np.zeros(2, np.float32)
+        actions = [np.tanh(head(features[part])) for head, part in zip(self._heads, self._parts, strict=True)]
+        others = zip(actions[1:], self._cruises[1:], strict=True)
+        quiet = all(np.abs(action - cruise).max() < QUIET for action, cruise in others)
+        return actions[0] if quiet else np.zeros(2, np.float32)
 
     def _k(self, features: FloatArray) -> Doubles:
         return kernel(self._x, unit(features, self._parts)[None], self._parts, self._widths)[:, 0]
@@ -71,6 +110,12 @@ def parts(sizes: Sequence[int]) -> list[slice]:
     """Where in x the output of each trunk is."""
     ends = np.cumsum(sizes).tolist()
     return [slice(end - size, end) for size, end in zip(sizes, ends, strict=True)]
+
+
+def unknown(k: Doubles, p: NDArray[Any]) -> Doubles:
+    """1 - k(x)^T P k(x), the posterior variance where s is 1: of one state k [n], or of several [m, n], [m]."""
+    known: Doubles = (k @ p * k).sum(axis=-1)
+    return np.maximum(0.0, 1.0 - known)
 
 
 def unit(features: FloatArray, parts: Sequence[slice]) -> FloatArray:

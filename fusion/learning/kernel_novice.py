@@ -3,6 +3,7 @@
 import math
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 
@@ -40,24 +41,18 @@ class KernelNovice(Novice):
         return self.ridge.act(self._x(features))
 
     def alone(self, features: Features) -> Action:
-        """m(x) with the turn times g."""
-        return self.ridge.act(self._x(features), self.ridge.gain)
+        """m(x) with the turn times g, and where it knows nothing what its experts do there."""
+        (action,) = self._alone([features], proving=False)
+        return action
 
     def proving(self, features: Features) -> Action:
         """The same. What it meets in the runs that prove it, it knows: the measure of its doubt afterwards."""
-        self._meet(self.ridge.k(self._x(features))[None])
-        return self.alone(features)
+        (action,) = self._alone([features], proving=True)
+        return action
 
     def together(self, *, proving: bool) -> Together:
-        """m(x) of several states with the turn times g."""
-
-        def act(seen: Sequence[Features]) -> list[Action]:
-            k = self.ridge.k(np.stack([self._x(each) for each in seen]))
-            if proving:
-                self._meet(k)
-            return self.ridge.actions(k, self.ridge.gain)
-
-        return act
+        """The same of several states."""
+        return partial(self._alone, proving=proving)
 
     @property
     def limit(self) -> float:
@@ -127,6 +122,16 @@ class KernelNovice(Novice):
             "limit": np.array([min((1.0 + ROUNDING) * self.limit, NEVER)], np.float32),
         }
         return KernelNet(replace(self._network.architecture, examples=int(used.sum())), weights)
+
+    def _alone(self, seen: Sequence[Features], *, proving: bool) -> list[Action]:
+        fallback = np.empty((len(seen), 2), np.float32)
+        x = np.empty((len(seen), self.ridge.x.shape[1]), np.float32)
+        for k, each in enumerate(seen):
+            x[k], fallback[k] = self._x(each), self._network.fallback(each)
+        likeness = self.ridge.k(x if len(seen) > 1 else x[0]).reshape(len(seen), -1)
+        if proving:
+            self._meet(likeness)
+        return self.ridge.actions(likeness, self.ridge.gain, fallback)
 
     def _meet(self, k: Doubles) -> None:
         """Keep the kernel values [m, n] of states of a proving run."""

@@ -188,6 +188,7 @@ PLUS = (
     _plus("plus-no-handover", approach=PlusSettings(handover_s=0.0)),
     _plus("plus-no-cleaning", kernel=KernelSettings(contradicts=None)),
     _plus("plus-no-gain", kernel=KernelSettings(gain=1.0)),
+    _plus("plus-no-fallback", kernel=KernelSettings(fallback=False)),
     _plus("plus-network", kernel=None),
     _plus("plus-practice", approach=PlusSettings(practice=True)),
     _plus("plus-sure", approach=PlusSettings(sure=0.25)),

@@ -41,7 +41,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from lira.fusion.inference.kernel_net import Doubles, kernel, parts
+from lira.fusion.inference.kernel_net import Doubles, kernel, parts, unknown
 from lira.fusion.policies.growing import Rows, Square
 from lira.hal.config import Table
 from lira.hal.messages import FloatArray
@@ -65,6 +65,7 @@ class KernelSettings(Table, frozen=True):
     noise: float = 0.1  # variance of a label of weight 1
     contradicts: float | None = 1.2  # residual of the turn that sets a label aside; None: none is
     gain: float | None = None
+    fallback: bool = True  # alone, it does what the first expert does where it knows nothing and the others are quiet
     most: int = 800
 
 
@@ -90,8 +91,7 @@ class Fit:
 
     def deviation(self, k: Doubles) -> Doubles:
         """sd [..., 2]."""
-        variance = 1.0 - (k @ self.p * k).sum(axis=-1, keepdims=True)
-        sd: Doubles = self.scale * np.sqrt(np.maximum(0.0, variance))
+        sd: Doubles = self.scale * np.sqrt(unknown(k, self.p))[..., None]
         return sd
 
     @cached_property
@@ -251,9 +251,15 @@ class KernelRidge:
         (action,) = self.actions(self.k(x)[None], gain)
         return action
 
-    def actions(self, k: Doubles, gain: float = 1.0) -> list[tuple[float, float]]:
-        """The same of several states, of which these are the kernel values [m, n]."""
-        return [(clipped(linear), clipped(gain * angular)) for linear, angular in self.fit.mean(k).tolist()]
+    def actions(self, k: Doubles, gain: float = 1.0, fallback: FloatArray | None = None) -> list[tuple[float, float]]:
+        """The same of several states, of which these are the kernel values [m, n].
+
+        `fallback` [m, 2] is added as far as nothing is known there, see `inference/kernel_net.py`.
+        """
+        actions = self.fit.mean(k) * (1.0, gain)
+        if fallback is not None:
+            actions += unknown(k, self.fit.p)[:, None] * fallback
+        return [(clipped(linear), clipped(angular)) for linear, angular in actions.tolist()]
 
     @property
     def gain(self) -> float:

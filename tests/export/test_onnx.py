@@ -43,12 +43,12 @@ def about(network):
     return Checkpoint.of(network, "thesis-sim", "a test", seed=1, cruise=(1.0, 0.0))
 
 
-def novice_of_plus():
+def novice_of_plus(falls_back=True):
     """One that was shown something."""
-    experts = [
-        load_checkpoint(path)[0] for path in PRETRAINED if path.stem in ("thesis-sim-camera", "thesis-sim-lidar")
-    ]
-    novice = KernelNovice(KernelNet.from_experts(experts), LearningSettings(), KernelSettings(), mirrored=True)
+    loaded = [load_checkpoint(path) for path in PRETRAINED if path.stem in ("thesis-sim-camera", "thesis-sim-lidar")]
+    cruises = [about.cruise for _, about in loaded] if falls_back else None
+    sees = KernelNet.from_experts([network for network, _ in loaded], cruises)
+    novice = KernelNovice(sees, LearningSettings(), KernelSettings(), mirrored=True)
     rng = np.random.default_rng(5)
     for k in range(12):
         source = "human" if k % 4 < 2 else "camera"
@@ -74,9 +74,13 @@ def test_a_novice_does_the_same(filters):
     )
 
 
-def test_a_novice_of_plus_does_the_same_and_says_how_sure_it_is():
-    network = novice_of_plus()
+@pytest.mark.parametrize("falls_back", [True, False])
+def test_a_novice_of_plus_does_the_same_and_says_how_sure_it_is(falls_back):
+    network = novice_of_plus(falls_back)
     seen = [seeing(SHAPES, seed) for seed in range(3, 30, 4)]  # some of them it was shown
+    seen += [Features(image=each["image"], scan=np.ones(SHAPES["scan"], np.float32)) for each in seen]  # nothing near
+    assert any(network.fallback(each).any() for each in seen) is falls_back
+    assert not all(network.fallback(each).any() for each in seen)
     got = ask(build(network, about(network)), seen)
     np.testing.assert_allclose(got["action"], [network.act(each) for each in seen], atol=CLOSE)
     np.testing.assert_allclose(got["deviation"], [network.deviation(each) for each in seen], atol=CLOSE)

@@ -23,9 +23,9 @@ def fusion_net(bins, filters, *, px=32, seed=0):
     return FusionNet(shapes(bins, px), filters, seed=seed)
 
 
-def kernel_net(bins, filters, *, px=32, seed=0):
+def kernel_net(bins, filters, *, px=32, seed=0, cruises=None):
     """A novice of plus that was taught nothing."""
-    return KernelNet.from_experts([camera_net(filters, px=px, seed=seed), lidar_net(bins, seed=seed)])
+    return KernelNet.from_experts([camera_net(filters, px=px, seed=seed), lidar_net(bins, seed=seed)], cruises)
 
 
 def noise(bins, seed=0):

@@ -8,6 +8,7 @@ from safetensors.numpy import save_file
 
 from lira.fusion.experts.files import shipped_path
 from lira.fusion.inference.checkpoint import Checkpoint, load_checkpoint, save_checkpoint
+from lira.fusion.inference.networks import DrivingNet
 from lira.fusion.preprocess import Features
 from lira.hal.errors import StorageError
 from lira.hal.profile import load_profile
@@ -30,6 +31,8 @@ def checkpoint(kind="fusion", **changes) -> Checkpoint:
         (camera_net(8, px=24, seed=1), checkpoint("camera", filters=8, features={"image": (24, 24)})),
         (lidar_net(101, seed=2), checkpoint("lidar", provenance='lira train-expert lidar "ä"')),
         (fusion_net(101, 16, seed=3), checkpoint()),
+        (kernel_net(101, 16), checkpoint("kernel")),
+        (kernel_net(101, 16, cruises=[(1.0, 0.0), (0.9, 0.1)]), checkpoint("kernel", fallback=True)),
     ],
 )
 def test_what_is_saved_is_loaded(tmp_path, network, about):
@@ -40,7 +43,8 @@ def test_what_is_saved_is_loaded(tmp_path, network, about):
     assert loaded.architecture == network.architecture
     px = about.features.get("image", (32,))[0]
     seen = Features(scan=SEEN.scan, image=SEEN.image[:px, :px].copy())
-    assert loaded.act(seen) == network.driving().act(seen)
+    driver = network if isinstance(network, DrivingNet) else network.driving()
+    assert loaded.act(seen) == driver.act(seen)
     assert [entry.name for entry in path.parent.iterdir()] == ["one.safetensors"]
 
 

@@ -28,8 +28,11 @@ def seen(seed):
     return Features(scan=random.random(BINS, dtype=np.float32), image=random.random((32, 32), dtype=np.float32))
 
 
-def novice(*, mirrored=True, settings=None, **learning):
-    sees = KernelNet.from_experts([camera_net(FILTERS, seed=1), lidar_net(BINS, seed=2)])
+CAMERA, LIDAR = camera_net(FILTERS, seed=1), lidar_net(BINS, seed=2)
+
+
+def novice(*, mirrored=True, settings=None, cruises=None, **learning):
+    sees = KernelNet.from_experts([CAMERA, LIDAR], cruises)
     learning = LearningSettings(**{"human_weight": 3.0} | learning)
     return KernelNovice(sees, learning, settings or KernelSettings(), mirrored=mirrored)
 
@@ -129,6 +132,35 @@ def test_the_parts_of_all_labels_together_are_the_action(mirrored):
     assert same.likeness == pytest.approx(1.0)
 
 
+def cruises(*, lidar_quiet):
+    """The lidar expert's cruise action is what it does on what `seen` shows, or far from it."""
+    action = np.array(LIDAR.driving().act(seen(77)))
+    return [(1.0, 0.0), tuple(action if lidar_quiet else action + 0.5)]
+
+
+def test_alone_it_does_what_the_first_expert_does_as_far_as_it_knows_nothing_and_the_others_are_quiet():
+    learner = novice(cruises=cruises(lidar_quiet=True))
+    first = CAMERA.driving().act(seen(77))
+    assert learner.alone(seen(77)) == pytest.approx(first)
+    assert learner.act(seen(77)) == (0.0, 0.0)  # it is taught as if nobody did it
+    for _ in range(20):
+        learner.remember(Label(seen(77), (-0.5, 0.25), "human", 3.0))
+    assert learner.alone(seen(77)) == pytest.approx(learner.ridge.act(learner.ridge.x[0], learner.ridge.gain), abs=0.02)
+
+
+def test_where_another_expert_has_something_to_say_it_stands():
+    assert novice(cruises=cruises(lidar_quiet=False)).alone(seen(77)) == (0.0, 0.0)
+    assert novice().alone(seen(77)) == (0.0, 0.0)
+
+
+def test_a_novice_of_plus_falls_back_on_its_experts_and_one_without_does_not():
+    profile = load_profile("thesis-sim")
+    line = Features(scan=np.ones(profile.features.bins, np.float32), image=np.eye(32, dtype=np.float32))
+    for name, falls_back in (("plus", True), ("plus-no-fallback", False), ("hg-dagger-kernel", True)):
+        learner = build_method(METHODS[name], profile, 0, InlineTrainer).novice
+        assert (learner.alone(line) != (0.0, 0.0)) is falls_back, name
+
+
 def test_it_is_less_sure_where_it_has_seen_nothing_like_it():
     learner = novice()
     for i in range(6):
@@ -141,8 +173,9 @@ def test_two_that_are_taught_the_same_are_the_same_to_the_bit():
     assert taught().act(seen(9)) == taught().act(seen(9))
 
 
-def test_frozen_it_drives_as_the_novice_alone_and_doubts_as_it_does():
-    learner = taught()
+@pytest.mark.parametrize("cruises", [None, cruises(lidar_quiet=True), cruises(lidar_quiet=False)])
+def test_frozen_it_drives_as_the_novice_alone_and_doubts_as_it_does(cruises):
+    learner = taught(cruises=cruises)
     network = learner.frozen()
     for each in map(seen, (0, 1, 77)):
         assert network.act(each) == pytest.approx(learner.alone(each), abs=1e-4)

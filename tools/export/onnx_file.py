@@ -18,7 +18,7 @@ from onnx import TensorProto, helper, numpy_helper
 
 from lira.fusion.inference.architecture import KERNEL, Architecture, Weights
 from lira.fusion.inference.checkpoint import Checkpoint
-from lira.fusion.inference.kernel_net import kernel, parts
+from lira.fusion.inference.kernel_net import QUIET, kernel, parts
 from lira.fusion.inference.layers import SLOPE
 from lira.fusion.inference.networks import DrivingNet
 from lira.hal.errors import StorageError
@@ -140,11 +140,32 @@ def _kernel(graph: Graph, what: Architecture, weights: Weights, seen: Sequence[s
     mean = graph.add("MatMul", [values, graph.constant("a", p @ weights["y"])])
     gains = graph.constant("gains", np.array([1.0, weights["gain"][0]], np.float32))
     turned = graph.add("Mul", [graph.add("Cast", [mean], to=TensorProto.FLOAT), gains])
-    limits = [graph.constant("low", np.float32(-1.0)), graph.constant("high", np.float32(1.0))]
-    graph.add("Clip", [turned, *limits], "action")
     known = graph.add("Mul", [graph.add("MatMul", [values, graph.constant("p", p)]), values])
     axis = graph.constant("examples", np.array([1]))
     rest = graph.add("Sub", [one, graph.add("ReduceSum", [known, axis], keepdims=1)])
-    spread = graph.add("Sqrt", [graph.add("Max", [rest, graph.constant("nothing", np.float64(0.0))])])
+    unknown = graph.add("Max", [rest, graph.constant("nothing", np.float64(0.0))])
+    if what.fallback:
+        left = graph.add(
+            "Mul", [graph.add("Cast", [unknown], to=TensorProto.FLOAT), _fallback(graph, what, weights, seen)]
+        )
+        turned = graph.add("Add", [turned, left])
+    limits = [graph.constant("low", np.float32(-1.0)), graph.constant("high", np.float32(1.0))]
+    graph.add("Clip", [turned, *limits], "action")
+    spread = graph.add("Sqrt", [unknown])
     scale = graph.constant("scale", weights["scale"])
     graph.add("Mul", [graph.add("Cast", [spread], to=TensorProto.FLOAT), scale], "deviation")
+
+
+def _fallback(graph: Graph, what: Architecture, weights: Weights, seen: Sequence[str]) -> str:
+    """What the first expert does where all others are quiet, else zero."""
+    layers = [f"{trunk}_out" for trunk in what.trunks.values()]
+    first, *others = [
+        graph.add("Tanh", [graph.dense(x, weights, layer)]) for x, layer in zip(seen, layers, strict=True)
+    ]
+    quiet = graph.constant("quiet", np.float32(QUIET))
+    for k, other in enumerate(others, start=1):
+        away = graph.add("Abs", [graph.add("Sub", [other, graph.constant(f"cruise.{k}", weights["cruise"][k])])])
+        furthest = graph.add("ReduceMax", [away], axes=[1], keepdims=1)
+        alone = graph.add("Cast", [graph.add("Less", [furthest, quiet])], to=TensorProto.FLOAT)
+        first = graph.add("Mul", [first, alone])
+    return first

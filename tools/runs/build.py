@@ -53,7 +53,9 @@ def build_method(
         novice: Novice
         if preset.kernel is not None:
             learning = msgspec.structs.replace(learning, turn=used_turn(profile.base))
-            novice = KernelNovice(KernelNet.from_experts(sees), learning, preset.kernel, mirrored=preset.mirrored)
+            cruises = [expert.cruise for _, expert in loaded] if preset.kernel.fallback else None
+            network = KernelNet.from_experts(sees, cruises)
+            novice = KernelNovice(network, learning, preset.kernel, mirrored=preset.mirrored)
         else:
             frozen = (trunks or preset.trunks) == "frozen"
             novice = network_novice(
