@@ -1,6 +1,5 @@
 """One tree of errors. Each says what is wrong and what to do about it; the `lira` command prints both."""
 
-import difflib
 from collections.abc import Iterable
 
 
@@ -56,5 +55,7 @@ class MissingExtraError(LiraError):
 
 def did_you_mean(word: str, known: Iterable[str], alike: float = 0.6) -> str:
     """Return the question whether the nearest of the known words was meant, empty if none is as much `alike`."""
+    import difflib  # whoever is understood need not wait for it
+
     near = difflib.get_close_matches(word, known, n=1, cutoff=alike)
     return f"Did you mean `{near[0]}`?" if near else ""

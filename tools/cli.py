@@ -161,7 +161,7 @@ def find_verb(name: str) -> Verb:
     """Look a verb up. Raises `ConfigError` that names the nearest one."""
     if name in VERBS:
         return VERBS[name]
-    meant = did_you_mean(name, VERBS)
+    meant = did_you_mean(name, VERBS, 0.5)
     raise ConfigError(f"unknown verb '{name}'", f"{meant} Verbs: {', '.join(VERBS)}.".lstrip())
 
 

@@ -1,7 +1,7 @@
 """Networks on disk: a .safetensors file with the weights and, as text, where they come from. No pickle."""
 
 import json
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Annotated, Any, Self
 
@@ -54,8 +54,10 @@ class Checkpoint:
         """Describe a network that was trained for a robot with this profile."""
         what = network.architecture
         shapes = dict(what.shapes)
-        about = cls(what.kind, shapes, what.filters, profile, cruise, provenance, seed)
-        return replace(about, examples=what.examples, fallback=what.fallback)
+        examples, fallback = what.examples, what.fallback
+        return cls(
+            what.kind, shapes, what.filters, profile, cruise, provenance, seed, examples=examples, fallback=fallback
+        )
 
     @property
     def architecture(self) -> Architecture:

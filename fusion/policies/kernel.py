@@ -257,7 +257,7 @@ class KernelRidge:
         `fallback` [m, 2] is added as far as nothing is known there, see `inference/kernel_net.py`.
         """
         actions = self.fit.mean(k) * (1.0, gain)
-        if fallback is not None:
+        if fallback is not None and fallback.any():
             actions += unknown(k, self.fit.p)[:, None] * fallback
         return [(clipped(linear), clipped(angular)) for linear, angular in actions.tolist()]
 

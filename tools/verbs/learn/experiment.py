@@ -86,7 +86,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Run the trials that are missing and print the tables."""
-    require("joblib", "matplotlib", "tqdm", *(["distributed"] if args.scheduler else []))
     from lira.tools.experiments.output.summary import to_json
     from lira.tools.output.machine import output_for, tell
 
@@ -102,6 +101,7 @@ def run(args: argparse.Namespace) -> int:
 
 def play(args: argparse.Namespace, name: str) -> "tuple[Summary, Path]":
     """Run one experiment; return its summary and its page."""
+    require("joblib", "matplotlib", "tqdm", *(["distributed"] if args.scheduler else []))
     from lira.fusion.methods.presets import file_name
     from lira.tools.experiments.output.page import write_page
     from lira.tools.experiments.output.summary import summarise
