@@ -7,11 +7,19 @@ that one does if all others are quiet, else zero, it does
 
 so that it does not lose a line only because nobody has shown it this one. Where two experts have something to say and
 nobody has shown it whom to follow, it stands as ever.
+
+Labels that say full steer to either side, before a box straight ahead or where the line is just out of view, have a
+mean that says neither. How large a turn they say, whichever side, is
+
+    s(x) = sqrt(k(x)^T P (y * y))                           y [n] the turns of the labels
+
+and where that is larger than the turn m says, it turns by g s(x) to the side that its experts say: that of the expert
+whose turn is furthest from its cruise action. The first expert, who always has something to say, counts half.
 """
 
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,10 +31,21 @@ from lira.fusion.preprocess import Features
 from lira.hal.messages import Action, FloatArray
 
 QUIET = 0.2  # an expert less than this away from its cruise action has nothing to say, as with `hold` of LIRA-SPF
+FIRST = 0.5  # what the first expert's voice counts when it is about which side
+UNDECIDED = 0.2  # so much larger a turn to either side than their mean: labels are not of one mind
 NEVER = 1e9  # a limit that no deviation comes to; a file holds finite numbers
 _LEAST_LENGTH = np.float32(1e-12)  # a trunk that sees nothing stays zero instead of becoming nan
 
+ANGULAR = 1  # of an action's two numbers
+
 Doubles = NDArray[np.float64]
+
+
+class Advice(NamedTuple):
+    """What the experts say where their novice knows nothing, or is undecided."""
+
+    first: FloatArray  # a_1 [2]: what the first expert does if all others are quiet, else zero
+    side: float  # to which the loudest of all wants to turn: -1, 1; 0 where that one is quiet
 
 
 class KernelNet(DrivingNet):
@@ -52,16 +71,18 @@ class KernelNet(DrivingNet):
         """x [size] of an observation."""
         return unit(self.features(seen), self._parts)
 
-    def fallback(self, seen: Features) -> FloatArray:
-        """a_1 [2] of an observation; zero for one that does not fall back."""
-        return self._fallback(self.features(seen))
+    def advice(self, seen: Features) -> Advice:
+        """What its experts say of an observation; nothing for one that does not ask them."""
+        return self._advice(self.features(seen))
 
     def head(self, features: FloatArray) -> FloatArray:
-        """m(x), the turn times g, and where it knows nothing a_1, clipped; `features` are what the trunks have made."""
-        k, first = self._k(features), self._fallback(features)
+        """m(x), the turn times g, with its experts' advice, clipped; `features` are what the trunks have made."""
+        k, (first, side) = self._k(features), self._advice(features)
         action = (k @ self._a).astype(np.float32) * self._gains
         if first.any():
             action += np.float32(unknown(k, self._p)) * first
+        if side:
+            action[ANGULAR] = decided(action[ANGULAR], self._gains[ANGULAR], k @ self._squares, side)
         clipped: FloatArray = np.clip(action, np.float32(-1.0), np.float32(1.0))
         return clipped
 
@@ -84,6 +105,7 @@ class KernelNet(DrivingNet):
         covariance = kernel(self._x, self._x, self._parts, self._widths) + np.diag(noise.astype(np.float64))
         self._p = np.linalg.inv(covariance)
         self._a: Doubles = self._p @ weights["y"]
+        self._squares: Doubles = self._p @ weights["y"][:, ANGULAR] ** 2
         self._gains = np.array([1.0, weights["gain"][0]], np.float32)
         self._scale, self._limit = weights["scale"], float(weights["limit"][0])
         self._heads: list[Dense] = []
@@ -94,13 +116,16 @@ class KernelNet(DrivingNet):
                 for trunk in self.architecture.trunks.values()
             ]
 
-    def _fallback(self, features: FloatArray) -> FloatArray:
+    def _advice(self, features: FloatArray) -> Advice:
         if not self._heads:
-            return np.zeros(2, np.float32)
-        actions = [np.tanh(head(features[part])) for head, part in zip(self._heads, self._parts, strict=True)]
-        others = zip(actions[1:], self._cruises[1:], strict=True)
-        quiet = all(np.abs(action - cruise).max() < QUIET for action, cruise in others)
-        return actions[0] if quiet else np.zeros(2, np.float32)
+            return Advice(np.zeros(2, np.float32), 0.0)
+        a = np.array([np.tanh(head(features[part])) for head, part in zip(self._heads, self._parts, strict=True)])
+        off = a - self._cruises
+        quiet = bool((np.abs(off[1:]) < QUIET).all())
+        turns = off[:, ANGULAR].copy()
+        turns[0] *= FIRST
+        loudest = float(turns[np.abs(turns).argmax()])
+        return Advice(a[0] if quiet else np.zeros(2, np.float32), np.sign(loudest) if abs(loudest) >= QUIET else 0.0)
 
     def _k(self, features: FloatArray) -> Doubles:
         return kernel(self._x, unit(features, self._parts)[None], self._parts, self._widths)[:, 0]
@@ -110,6 +135,13 @@ def parts(sizes: Sequence[int]) -> list[slice]:
     """Where in x the output of each trunk is."""
     ends = np.cumsum(sizes).tolist()
     return [slice(end - size, end) for size, end in zip(sizes, ends, strict=True)]
+
+
+def decided(turn: NDArray[Any], gain: float, squares: NDArray[Any], side: NDArray[Any] | float) -> NDArray[Any]:
+    """The turn [...], or g s(x) to that side where this is much more; `squares` are those of s(x)."""
+    size = gain * np.sqrt(np.maximum(squares, 0.0))
+    undecided = (size > np.abs(turn) + UNDECIDED) & np.not_equal(side, 0.0)
+    return np.where(undecided, side * size, turn)
 
 
 def unknown(k: Doubles, p: NDArray[Any]) -> Doubles:

@@ -7,11 +7,11 @@ from functools import partial
 
 import numpy as np
 
-from lira.fusion.inference.kernel_net import NEVER, Doubles, KernelNet
+from lira.fusion.inference.kernel_net import ANGULAR, NEVER, Doubles, KernelNet
 from lira.fusion.learning.labels import Label, mirror
 from lira.fusion.learning.learned_policy import Contradiction, Part, Together
 from lira.fusion.learning.novice import LearningSettings, Novice
-from lira.fusion.policies.kernel import ANGULAR, KernelRidge, KernelSettings
+from lira.fusion.policies.kernel import KernelRidge, KernelSettings
 from lira.fusion.preprocess import Features
 from lira.hal.messages import Action, Driver, FloatArray
 
@@ -41,7 +41,7 @@ class KernelNovice(Novice):
         return self.ridge.act(self._x(features))
 
     def alone(self, features: Features) -> Action:
-        """m(x) with the turn times g, and where it knows nothing what its experts do there."""
+        """m(x) with the turn times g, and with its experts' advice."""
         (action,) = self._alone([features], proving=False)
         return action
 
@@ -124,14 +124,12 @@ class KernelNovice(Novice):
         return KernelNet(replace(self._network.architecture, examples=int(used.sum())), weights)
 
     def _alone(self, seen: Sequence[Features], *, proving: bool) -> list[Action]:
-        fallback = np.empty((len(seen), 2), np.float32)
-        x = np.empty((len(seen), self.ridge.x.shape[1]), np.float32)
-        for k, each in enumerate(seen):
-            x[k], fallback[k] = self._x(each), self._network.fallback(each)
+        x = np.array([self._x(each) for each in seen])
+        advice = [self._network.advice(each) for each in seen]
         likeness = self.ridge.k(x if len(seen) > 1 else x[0]).reshape(len(seen), -1)
         if proving:
             self._meet(likeness)
-        return self.ridge.actions(likeness, self.ridge.gain, fallback)
+        return self.ridge.actions(likeness, self.ridge.gain, advice)
 
     def _meet(self, k: Doubles) -> None:
         """Keep the kernel values [m, n] of states of a proving run."""

@@ -34,19 +34,18 @@ changes P by O(n^2) work and in its place, so it is done between two steps.
 k itself, and the novice as it drives when nobody teaches it any more, are in `inference/kernel_net.py`.
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
-from lira.fusion.inference.kernel_net import Doubles, kernel, parts, unknown
+from lira.fusion.inference.kernel_net import ANGULAR, Advice, Doubles, decided, kernel, parts, unknown
 from lira.fusion.policies.growing import Rows, Square
 from lira.hal.config import Table
 from lira.hal.messages import FloatArray
 
-LINEAR, ANGULAR = 0, 1
 GAINS = (1.0, 1.7)  # bounds of g: few interventions tell little of it, and beyond this nothing was gained
 
 Flags = NDArray[np.bool_]
@@ -65,7 +64,7 @@ class KernelSettings(Table, frozen=True):
     noise: float = 0.1  # variance of a label of weight 1
     contradicts: float | None = 1.2  # residual of the turn that sets a label aside; None: none is
     gain: float | None = None
-    fallback: bool = True  # alone, it does what the first expert does where it knows nothing and the others are quiet
+    fallback: bool = True  # alone, it asks its experts where it knows nothing, or which way to turn
     most: int = 800
 
 
@@ -93,6 +92,12 @@ class Fit:
         """sd [..., 2]."""
         sd: Doubles = self.scale * np.sqrt(unknown(k, self.p))[..., None]
         return sd
+
+    @cached_property
+    def squares(self) -> Doubles:
+        """P (y * y) [n], y being the turns: k(x)^T times it is s(x)^2."""
+        product: Doubles = self.p @ self.y[:, ANGULAR] ** 2
+        return product
 
     @cached_property
     def left_out(self) -> tuple[Doubles, Doubles]:
@@ -251,14 +256,20 @@ class KernelRidge:
         (action,) = self.actions(self.k(x)[None], gain)
         return action
 
-    def actions(self, k: Doubles, gain: float = 1.0, fallback: FloatArray | None = None) -> list[tuple[float, float]]:
+    def actions(
+        self, k: Doubles, gain: float = 1.0, advice: Sequence[Advice] | None = None
+    ) -> list[tuple[float, float]]:
         """The same of several states, of which these are the kernel values [m, n].
 
-        `fallback` [m, 2] is added as far as nothing is known there, see `inference/kernel_net.py`.
+        With experts' `advice` for each as `inference/kernel_net.py` tells.
         """
         actions = self.fit.mean(k) * (1.0, gain)
-        if fallback is not None and fallback.any():
-            actions += unknown(k, self.fit.p)[:, None] * fallback
+        if advice is not None:
+            first, side = np.array([each.first for each in advice]), np.array([each.side for each in advice])
+            if first.any():
+                actions += unknown(k, self.fit.p)[:, None] * first
+            if side.any():
+                actions[:, ANGULAR] = decided(actions[:, ANGULAR], gain, k @ self.fit.squares, side)
         return [(clipped(linear), clipped(angular)) for linear, angular in actions.tolist()]
 
     @property

@@ -153,6 +153,31 @@ def test_where_another_expert_has_something_to_say_it_stands():
     assert novice().alone(seen(77)) == (0.0, 0.0)
 
 
+@pytest.mark.parametrize(
+    ("camera", "lidar", "side"),
+    [(0.5, 0.0, 1.0), (-0.5, 0.0, -1.0), (-0.5, 0.3, 1.0), (0.5, -0.3, -1.0), (0.1, 0.1, 0.0)],
+)
+def test_where_labels_say_full_steer_to_either_side_it_turns_to_the_one_that_its_experts_say(camera, lidar, side):
+    """That of the lidar expert where that one has something to say; nobody's, where neither has."""
+    did = [np.array(expert.driving().act(seen(77))) for expert in (CAMERA, LIDAR)]
+    learner = novice(
+        cruises=[tuple(each - (0.0, off)) for each, off in zip(did, (camera, lidar), strict=True)], mirrored=False
+    )
+    for _ in range(20):
+        for turn in (1.0, -1.0):
+            learner.remember(Label(seen(77), (1.0, turn), "human", 3.0))
+    assert learner.alone(seen(77))[1] == pytest.approx(side, abs=0.1)
+    assert learner.act(seen(77))[1] == pytest.approx(0.0, abs=0.1)  # it is taught as ever
+    assert learner.frozen().act(seen(77)) == pytest.approx(learner.alone(seen(77)), abs=1e-4)
+
+
+def test_labels_with_one_mind_are_followed_whatever_the_experts_say():
+    learner = novice(cruises=cruises(lidar_quiet=False), mirrored=False)
+    for _ in range(20):
+        learner.remember(Label(seen(77), (1.0, -0.5), "human", 3.0))
+    assert learner.alone(seen(77))[1] == pytest.approx(-0.5 * learner.ridge.gain, abs=0.05)
+
+
 def test_a_novice_of_plus_falls_back_on_its_experts_and_one_without_does_not():
     profile = load_profile("thesis-sim")
     line = Features(scan=np.ones(profile.features.bins, np.float32), image=np.eye(32, dtype=np.float32))

@@ -18,7 +18,7 @@ from onnx import TensorProto, helper, numpy_helper
 
 from lira.fusion.inference.architecture import KERNEL, Architecture, Weights
 from lira.fusion.inference.checkpoint import Checkpoint
-from lira.fusion.inference.kernel_net import QUIET, kernel, parts
+from lira.fusion.inference.kernel_net import ANGULAR, FIRST, QUIET, UNDECIDED, kernel, parts
 from lira.fusion.inference.layers import SLOPE
 from lira.fusion.inference.networks import DrivingNet
 from lira.hal.errors import StorageError
@@ -87,6 +87,10 @@ class Graph:
         self.nodes.append(helper.make_node(kind, list(inputs), [output], **attributes))
         return output
 
+    def cast(self, x: str) -> str:
+        """In single precision."""
+        return self.add("Cast", [x], to=TensorProto.FLOAT)
+
     def dense(self, x: str, weights: Weights, layer: str) -> str:
         """y = W x + b."""
         named = [self.constant(name, weights[name]) for name in (f"{layer}.weight", f"{layer}.bias")]
@@ -139,33 +143,53 @@ def _kernel(graph: Graph, what: Architecture, weights: Weights, seen: Sequence[s
     values = graph.add("Exp", [graph.add("Sum", exponents)])
     mean = graph.add("MatMul", [values, graph.constant("a", p @ weights["y"])])
     gains = graph.constant("gains", np.array([1.0, weights["gain"][0]], np.float32))
-    turned = graph.add("Mul", [graph.add("Cast", [mean], to=TensorProto.FLOAT), gains])
+    turned = graph.add("Mul", [graph.cast(mean), gains])
     known = graph.add("Mul", [graph.add("MatMul", [values, graph.constant("p", p)]), values])
     axis = graph.constant("examples", np.array([1]))
     rest = graph.add("Sub", [one, graph.add("ReduceSum", [known, axis], keepdims=1)])
     unknown = graph.add("Max", [rest, graph.constant("nothing", np.float64(0.0))])
     if what.fallback:
-        left = graph.add(
-            "Mul", [graph.add("Cast", [unknown], to=TensorProto.FLOAT), _fallback(graph, what, weights, seen)]
-        )
-        turned = graph.add("Add", [turned, left])
+        squares = graph.add("MatMul", [values, graph.constant("squares", p @ weights["y"][:, ANGULAR:] ** 2)])
+        turned = _advised(graph, what, weights, seen, turned, unknown, squares)
     limits = [graph.constant("low", np.float32(-1.0)), graph.constant("high", np.float32(1.0))]
     graph.add("Clip", [turned, *limits], "action")
     spread = graph.add("Sqrt", [unknown])
     scale = graph.constant("scale", weights["scale"])
-    graph.add("Mul", [graph.add("Cast", [spread], to=TensorProto.FLOAT), scale], "deviation")
+    graph.add("Mul", [graph.cast(spread), scale], "deviation")
 
 
-def _fallback(graph: Graph, what: Architecture, weights: Weights, seen: Sequence[str]) -> str:
-    """What the first expert does where all others are quiet, else zero."""
+def _advised(
+    graph: Graph, what: Architecture, weights: Weights, seen: Sequence[str], action: str, unknown: str, squares: str
+) -> str:
+    """The action with the experts' advice, see `KernelNet.advice` and `decided`."""
     layers = [f"{trunk}_out" for trunk in what.trunks.values()]
-    first, *others = [
-        graph.add("Tanh", [graph.dense(x, weights, layer)]) for x, layer in zip(seen, layers, strict=True)
-    ]
+    actions = [graph.add("Tanh", [graph.dense(x, weights, layer)]) for x, layer in zip(seen, layers, strict=True)]
+    column, none = graph.constant("column", np.array([ANGULAR])), graph.constant("none", np.float32(0.0))
+    away, turns = [], []
+    for k, each in enumerate(actions):
+        off = graph.add("Sub", [each, graph.constant(f"cruise.{k}", weights["cruise"][k])])
+        away.append(graph.add("ReduceMax", [graph.add("Abs", [off])], axes=[1], keepdims=1))
+        turns.append(graph.add("Gather", [off, column], axis=1))
     quiet = graph.constant("quiet", np.float32(QUIET))
-    for k, other in enumerate(others, start=1):
-        away = graph.add("Abs", [graph.add("Sub", [other, graph.constant(f"cruise.{k}", weights["cruise"][k])])])
-        furthest = graph.add("ReduceMax", [away], axes=[1], keepdims=1)
-        alone = graph.add("Cast", [graph.add("Less", [furthest, quiet])], to=TensorProto.FLOAT)
-        first = graph.add("Mul", [first, alone])
-    return first
+    first = graph.add("Where", [graph.add("Less", [graph.add("Max", away[1:]), quiet]), actions[0], none])
+    linear, turn = (
+        graph.add("Gather", [graph.add("Add", [action, graph.add("Mul", [graph.cast(unknown), first])]), each], axis=1)
+        for each in (graph.constant("row", np.array([0])), column)
+    )
+    voices = graph.add(
+        "Concat", [graph.add("Mul", [turns[0], graph.constant("half", np.float32(FIRST))]), *turns[1:]], axis=1
+    )
+    most, least = (graph.add(kind, [voices], axes=[1], keepdims=1) for kind in ("ReduceMax", "ReduceMin"))
+    loudest = graph.add("Where", [graph.add("Greater", [graph.add("Neg", [least]), most]), least, most])
+    size = graph.add(
+        "Mul",
+        [
+            graph.cast(graph.add("Sqrt", [graph.add("Max", [squares, graph.constant("zero", np.float64(0.0))])])),
+            graph.constant("gain", weights["gain"]),
+        ],
+    )
+    more = graph.add("Add", [graph.add("Abs", [turn]), graph.constant("undecided", np.float32(UNDECIDED))])
+    speaks = graph.add("GreaterOrEqual", [graph.add("Abs", [loudest]), quiet])
+    undecided = graph.add("And", [graph.add("Greater", [size, more]), speaks])
+    to_side = graph.add("Mul", [graph.add("Sign", [loudest]), size])
+    return graph.add("Concat", [linear, graph.add("Where", [undecided, to_side, turn])], axis=1)
