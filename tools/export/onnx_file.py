@@ -171,23 +171,16 @@ def _advised(
         away.append(graph.add("ReduceMax", [graph.add("Abs", [off])], axes=[1], keepdims=1))
         turns.append(graph.add("Gather", [off, column], axis=1))
     quiet = graph.constant("quiet", np.float32(QUIET))
-    first = graph.add("Where", [graph.add("Less", [graph.add("Max", away[1:]), quiet]), actions[0], none])
-    linear, turn = (
-        graph.add("Gather", [graph.add("Add", [action, graph.add("Mul", [graph.cast(unknown), first])]), each], axis=1)
-        for each in (graph.constant("row", np.array([0])), column)
-    )
-    voices = graph.add(
-        "Concat", [graph.add("Mul", [turns[0], graph.constant("half", np.float32(FIRST))]), *turns[1:]], axis=1
-    )
+    first = graph.add("Where", [graph.add("Less", [graph.add("Max", [none, *away[1:]]), quiet]), actions[0], none])
+    filled = graph.add("Add", [action, graph.add("Mul", [graph.cast(unknown), first])])
+    row = graph.constant("row", np.array([0]))
+    linear, turn = (graph.add("Gather", [filled, each], axis=1) for each in (row, column))
+    half = graph.add("Mul", [turns[0], graph.constant("half", np.float32(FIRST))])
+    voices = graph.add("Concat", [half, *turns[1:]], axis=1)
     most, least = (graph.add(kind, [voices], axes=[1], keepdims=1) for kind in ("ReduceMax", "ReduceMin"))
     loudest = graph.add("Where", [graph.add("Greater", [graph.add("Neg", [least]), most]), least, most])
-    size = graph.add(
-        "Mul",
-        [
-            graph.cast(graph.add("Sqrt", [graph.add("Max", [squares, graph.constant("zero", np.float64(0.0))])])),
-            graph.constant("gain", weights["gain"]),
-        ],
-    )
+    root = graph.add("Sqrt", [graph.add("Max", [squares, graph.constant("zero", np.float64(0.0))])])
+    size = graph.add("Mul", [graph.cast(root), graph.constant("gain", weights["gain"])])
     more = graph.add("Add", [graph.add("Abs", [turn]), graph.constant("undecided", np.float32(UNDECIDED))])
     speaks = graph.add("GreaterOrEqual", [graph.add("Abs", [loudest]), quiet])
     undecided = graph.add("And", [graph.add("Greater", [size, more]), speaks])
