@@ -45,8 +45,8 @@ PROOFS = 3  # more of them are a matter of luck: of the shipped camera's ways ba
 class Anew:
     """A curriculum of which every lap, and every proof, is driven elsewhere.
 
-    Each drive gets a layout of its own and begins up to `APART_M` further on, as far beside the way and as askew as it
-    was or down to `LEAST` of that, or with left and right exchanged.
+    Each drive gets a layout of its own and begins up to `APART_M` further on, on either side of the way and askew to
+    either side, each as much as it was or down to `LEAST` of that.
     """
 
     course: Curriculum
@@ -68,7 +68,7 @@ class Anew:
 
 def _elsewhere(drive: Drive, random: np.random.Generator) -> Drive:
     layout, further_m = int(random.integers(LAYOUTS)), float(random.uniform(0.0, APART_M))
-    aside, askew = (random.choice((-1.0, 1.0)) * random.uniform(LEAST, 1.0, 2)).tolist()
+    aside, askew = (random.choice((-1.0, 1.0), 2) * random.uniform(LEAST, 1.0, 2)).tolist()
     began = drive.episode
     start_m = began.start_m + further_m if began.start_m else 0.0
     episode = Episode(layout, start_m, aside * began.lateral_m, askew * began.yaw_rad)
@@ -80,22 +80,11 @@ STRAIGHT_ON = msgspec.structs.replace(STRICT, margin_m=0.2, horizon_s=2.0, follo
 ASKEW = ((0.15, 0.0), (-0.15, 0.0), (0.3, 0.1), (-0.3, -0.1), (0.0, 0.2), (0.0, -0.2))  # metres aside, and yaw
 
 
-BESIDE = ((0.5, -0.3), (-0.5, 0.3), (0.9, -0.6), (-0.9, 0.6), (0.9, 0.0), (-0.9, 0.0), (0.3, 0.5), (-0.3, -0.5))
-# As a novice comes back from behind a box: mostly across the line, of which little is in view then.
-ACROSS = ((0.5, -0.3), (0.6, -1.2), (0.9, -0.6), (0.9, -1.2), (0.9, 0.0), (0.5, -0.9), (0.3, 0.5), (0.7, -1.0))
-
-
-def _line_camera(
-    teacher: TeacherSettings, askew: Sequence[tuple[float, float]], apart_m: float, back_s: float, back_m: float
-) -> Curriculum:
+def _line_camera(teacher: TeacherSettings, back_s: float = 8.0, back_m: float = 0.35) -> Curriculum:
     """A lap of the curved line, then starts beside it and askew: the expert has to find its way back (fig. E.2b)."""
+    askew = [(0.5, -0.3), (-0.5, 0.3), (0.9, -0.6), (-0.9, 0.6), (0.9, 0.0), (-0.9, 0.0), (0.3, 0.5), (-0.3, -0.5)]
     recoveries = [
-        Drive(
-            Episode(0, start_m=3.0 + apart_m * k, lateral_m=lateral, yaw_rad=yaw),
-            back_s,
-            "stay",
-            final_lateral_m=back_m,
-        )
+        Drive(Episode(0, start_m=3.0 + 4.0 * k, lateral_m=lateral, yaw_rad=yaw), back_s, "stay", final_lateral_m=back_m)
         for k, (lateral, yaw) in enumerate(askew)
     ]
     teacher = msgspec.structs.replace(teacher, lateral_m=0.2)
@@ -177,11 +166,10 @@ def _anew(course: Curriculum) -> Curriculum:
 
 CURRICULA = {
     DEFAULT: {
-        "camera": _anew(_line_camera(STRICT, 2 * ACROSS, apart_m=2.8, back_s=5.0, back_m=0.2)),
+        "camera": _anew(_line_camera(STRICT, back_s=5.0, back_m=0.2)),
         "lidar": _anew(_line_lidar()),
     },
-    # Appendix C is about an expert taught as a person does: bang-bang.
-    "eight": {"camera": _line_camera(SKILLED, BESIDE, apart_m=4.0, back_s=8.0, back_m=0.35)},
+    "eight": {"camera": _line_camera(SKILLED)},  # Appendix C is about an expert taught as a person does: bang-bang
     "passage": {"camera": _passage(), "lidar": _passage()},
     "garden": {"camera": _garden_camera(), "lidar": _garden_lidar()},
     "corridor": {"camera": _corridor_camera()},
