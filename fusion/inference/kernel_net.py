@@ -13,10 +13,11 @@ mean that says neither. How large a turn they say, whichever side, is
 
     s(x) = sqrt(k(x)^T P (y * y))                           y [n] the turns of the labels
 
-and where that is larger than the turn m says, it turns by g s(x) to the side that its experts say: that of the expert
-whose turn is furthest from its cruise action. The first expert, who always has something to say, counts half.
+and where that is larger than the turn above, it turns by g s(x) to the side that the first expert says, if all others
+are quiet and that one is not.
 """
 
+import math
 from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any, NamedTuple
@@ -31,7 +32,6 @@ from lira.fusion.preprocess import Features
 from lira.hal.messages import Action, FloatArray
 
 QUIET = 0.2  # an expert less than this away from its cruise action has nothing to say, as with `hold` of LIRA-SPF
-FIRST = 0.5  # what the first expert's voice counts when it is about which side
 UNDECIDED = 0.2  # so much larger a turn to either side than their mean: labels are not of one mind
 NEVER = 1e9  # a limit that no deviation comes to; a file holds finite numbers
 _LEAST_LENGTH = np.float32(1e-12)  # a trunk that sees nothing stays zero instead of becoming nan
@@ -42,10 +42,13 @@ Doubles = NDArray[np.float64]
 
 
 class Advice(NamedTuple):
-    """What the experts say where their novice knows nothing, or is undecided."""
+    """What the first expert says where all others are quiet; nothing, where one of them is not."""
 
-    first: FloatArray  # a_1 [2]: what the first expert does if all others are quiet, else zero
-    side: float  # to which the loudest of all wants to turn: -1, 1; 0 where that one is quiet
+    action: FloatArray  # a_1 [2], or zero
+    side: float  # of its turn, -1 or 1, or 0 if it does about what it does while cruising
+
+
+SILENCE = Advice(np.zeros(2, np.float32), 0.0)
 
 
 class KernelNet(DrivingNet):
@@ -72,17 +75,16 @@ class KernelNet(DrivingNet):
         return unit(self.features(seen), self._parts)
 
     def advice(self, seen: Features) -> Advice:
-        """What its experts say of an observation; nothing for one that does not ask them."""
+        """What its first expert says of an observation; nothing for one that does not ask."""
         return self._advice(self.features(seen))
 
     def head(self, features: FloatArray) -> FloatArray:
-        """m(x), the turn times g, with its experts' advice, clipped; `features` are what the trunks have made."""
-        k, (first, side) = self._k(features), self._advice(features)
+        """m(x), the turn times g, with its first expert's advice, clipped; `features` are what the trunks have made."""
+        k, advice = self._k(features), self._advice(features)
         action = (k @ self._a).astype(np.float32) * self._gains
-        if first.any():
-            action += np.float32(unknown(k, self._p)) * first
-        if side:
-            action[ANGULAR] = decided(action[ANGULAR], self._gains[ANGULAR], k @ self._squares, side)
+        if advice is not SILENCE:
+            action += np.float32(unknown(k, self._p)) * advice.action
+            action[ANGULAR] = decided(action[ANGULAR], self._gains[ANGULAR], k @ self._squares, advice.side)
         clipped: FloatArray = np.clip(action, np.float32(-1.0), np.float32(1.0))
         return clipped
 
@@ -118,14 +120,13 @@ class KernelNet(DrivingNet):
 
     def _advice(self, features: FloatArray) -> Advice:
         if not self._heads:
-            return Advice(np.zeros(2, np.float32), 0.0)
-        a = np.array([np.tanh(head(features[part])) for head, part in zip(self._heads, self._parts, strict=True)])
-        off = a - self._cruises
-        quiet = bool((np.abs(off[1:]) < QUIET).all())
-        turns = off[:, ANGULAR].copy()
-        turns[0] *= FIRST
-        loudest = float(turns[np.abs(turns).argmax()])
-        return Advice(a[0] if quiet else np.zeros(2, np.float32), np.sign(loudest) if abs(loudest) >= QUIET else 0.0)
+            return SILENCE
+        actions = [np.tanh(head(features[part])) for head, part in zip(self._heads, self._parts, strict=True)]
+        away = np.array(actions) - self._cruises
+        if np.abs(away[1:]).max(initial=0.0) >= QUIET:
+            return SILENCE
+        turn = float(away[0, ANGULAR])
+        return Advice(actions[0], math.copysign(1.0, turn) if abs(turn) >= QUIET else 0.0)
 
     def _k(self, features: FloatArray) -> Doubles:
         return kernel(self._x, unit(features, self._parts)[None], self._parts, self._widths)[:, 0]

@@ -41,7 +41,7 @@ class KernelNovice(Novice):
         return self.ridge.act(self._x(features))
 
     def alone(self, features: Features) -> Action:
-        """m(x) with the turn times g, and with its experts' advice."""
+        """m(x) with the turn times g, and with its first expert's advice."""
         (action,) = self._alone([features], proving=False)
         return action
 

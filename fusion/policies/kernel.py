@@ -64,7 +64,7 @@ class KernelSettings(Table, frozen=True):
     noise: float = 0.1  # variance of a label of weight 1
     contradicts: float | None = 1.2  # residual of the turn that sets a label aside; None: none is
     gain: float | None = None
-    fallback: bool = True  # alone, it asks its experts where it knows nothing, or which way to turn
+    fallback: bool = True  # alone, it asks its first expert where it knows nothing, or which way to turn
     most: int = 800
 
 
@@ -261,15 +261,13 @@ class KernelRidge:
     ) -> list[tuple[float, float]]:
         """The same of several states, of which these are the kernel values [m, n].
 
-        With experts' `advice` for each as `inference/kernel_net.py` tells.
+        With the first expert's `advice` for each as `inference/kernel_net.py` tells.
         """
         actions = self.fit.mean(k) * (1.0, gain)
         if advice is not None:
-            first, side = np.array([each.first for each in advice]), np.array([each.side for each in advice])
-            if first.any():
-                actions += unknown(k, self.fit.p)[:, None] * first
-            if side.any():
-                actions[:, ANGULAR] = decided(actions[:, ANGULAR], gain, k @ self.fit.squares, side)
+            first, side = np.array([each.action for each in advice]), np.array([each.side for each in advice])
+            actions += unknown(k, self.fit.p)[:, None] * first
+            actions[:, ANGULAR] = decided(actions[:, ANGULAR], gain, k @ self.fit.squares, side)
         return [(clipped(linear), clipped(angular)) for linear, angular in actions.tolist()]
 
     @property

@@ -155,10 +155,10 @@ def test_where_another_expert_has_something_to_say_it_stands():
 
 @pytest.mark.parametrize(
     ("camera", "lidar", "side"),
-    [(0.5, 0.0, 1.0), (-0.5, 0.0, -1.0), (-0.5, 0.3, 1.0), (0.5, -0.3, -1.0), (0.1, 0.1, 0.0)],
+    [(0.5, 0.0, 1.0), (-0.5, 0.0, -1.0), (-0.5, 0.3, 0.0), (0.5, -0.3, 0.0), (0.1, 0.1, 0.0)],
 )
-def test_where_labels_say_full_steer_to_either_side_it_turns_to_the_one_that_its_experts_say(camera, lidar, side):
-    """That of the lidar expert where that one has something to say; nobody's, where neither has."""
+def test_where_labels_say_full_steer_to_either_side_it_turns_to_the_one_that_its_first_expert_says(camera, lidar, side):
+    """To neither where the lidar expert has something to say, too, or where neither has."""
     did = [np.array(expert.driving().act(seen(77))) for expert in (CAMERA, LIDAR)]
     learner = novice(
         cruises=[tuple(each - (0.0, off)) for each, off in zip(did, (camera, lidar), strict=True)], mirrored=False

@@ -18,7 +18,7 @@ from onnx import TensorProto, helper, numpy_helper
 
 from lira.fusion.inference.architecture import KERNEL, Architecture, Weights
 from lira.fusion.inference.checkpoint import Checkpoint
-from lira.fusion.inference.kernel_net import ANGULAR, FIRST, QUIET, UNDECIDED, kernel, parts
+from lira.fusion.inference.kernel_net import ANGULAR, QUIET, UNDECIDED, kernel, parts
 from lira.fusion.inference.layers import SLOPE
 from lira.fusion.inference.networks import DrivingNet
 from lira.hal.errors import StorageError
@@ -161,28 +161,25 @@ def _kernel(graph: Graph, what: Architecture, weights: Weights, seen: Sequence[s
 def _advised(
     graph: Graph, what: Architecture, weights: Weights, seen: Sequence[str], action: str, unknown: str, squares: str
 ) -> str:
-    """The action with the experts' advice, see `KernelNet.advice` and `decided`."""
+    """The action with the first expert's advice, see `KernelNet.advice` and `decided`."""
     layers = [f"{trunk}_out" for trunk in what.trunks.values()]
     actions = [graph.add("Tanh", [graph.dense(x, weights, layer)]) for x, layer in zip(seen, layers, strict=True)]
     column, none = graph.constant("column", np.array([ANGULAR])), graph.constant("none", np.float32(0.0))
-    away, turns = [], []
-    for k, each in enumerate(actions):
-        off = graph.add("Sub", [each, graph.constant(f"cruise.{k}", weights["cruise"][k])])
-        away.append(graph.add("ReduceMax", [graph.add("Abs", [off])], axes=[1], keepdims=1))
-        turns.append(graph.add("Gather", [off, column], axis=1))
     quiet = graph.constant("quiet", np.float32(QUIET))
-    first = graph.add("Where", [graph.add("Less", [graph.add("Max", [none, *away[1:]]), quiet]), actions[0], none])
+    away = [
+        graph.add("Sub", [each, graph.constant(f"cruise.{k}", weights["cruise"][k])]) for k, each in enumerate(actions)
+    ]
+    loudest = [graph.add("ReduceMax", [graph.add("Abs", [each])], axes=[1], keepdims=1) for each in away[1:]]
+    asked = graph.add("Less", [graph.add("Max", [none, *loudest]), quiet])
+    first = graph.add("Where", [asked, actions[0], none])
     filled = graph.add("Add", [action, graph.add("Mul", [graph.cast(unknown), first])])
     row = graph.constant("row", np.array([0]))
     linear, turn = (graph.add("Gather", [filled, each], axis=1) for each in (row, column))
-    half = graph.add("Mul", [turns[0], graph.constant("half", np.float32(FIRST))])
-    voices = graph.add("Concat", [half, *turns[1:]], axis=1)
-    most, least = (graph.add(kind, [voices], axes=[1], keepdims=1) for kind in ("ReduceMax", "ReduceMin"))
-    loudest = graph.add("Where", [graph.add("Greater", [graph.add("Neg", [least]), most]), least, most])
+    its_turn = graph.add("Gather", [away[0], column], axis=1)
+    speaks = graph.add("And", [asked, graph.add("GreaterOrEqual", [graph.add("Abs", [its_turn]), quiet])])
     root = graph.add("Sqrt", [graph.add("Max", [squares, graph.constant("zero", np.float64(0.0))])])
     size = graph.add("Mul", [graph.cast(root), graph.constant("gain", weights["gain"])])
     more = graph.add("Add", [graph.add("Abs", [turn]), graph.constant("undecided", np.float32(UNDECIDED))])
-    speaks = graph.add("GreaterOrEqual", [graph.add("Abs", [loudest]), quiet])
     undecided = graph.add("And", [graph.add("Greater", [size, more]), speaks])
-    to_side = graph.add("Mul", [graph.add("Sign", [loudest]), size])
+    to_side = graph.add("Mul", [graph.add("Sign", [its_turn]), size])
     return graph.add("Concat", [linear, graph.add("Where", [undecided, to_side, turn])], axis=1)
