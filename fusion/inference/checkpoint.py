@@ -1,7 +1,7 @@
 """Networks on disk: a .safetensors file with the weights and, as text, where they come from. No pickle."""
 
 import json
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Annotated, Any, Self
 
@@ -21,7 +21,7 @@ from lira.hal.profile import MAX_FILTERS
 
 MOST_BYTES = 2**28  # eighty times the largest network that any robot here needs
 MOST_EXAMPLES = 4096
-_OF_KERNELS = ("examples", "fallback")
+_OF_KERNELS = ("examples", "fallback", "sides")
 _KEY = "lira"  # the one metadata entry, JSON
 _Share = Annotated[float, Meta(ge=-1.01, le=1.01)]  # of a robot's top speed
 
@@ -34,7 +34,7 @@ class Checkpoint:
     the trunks that see pictures, 0 without any. `cruise` is an expert's measured action (linear, angular) on an empty
     straight course; `provenance` the command that made it. `labels` and `training_steps` are what it took; None for a
     file that was written before they were counted. `examples` is how many a kernel drives by, and `fallback` whether
-    it falls back on its experts; the file of a network does not speak of these.
+    it falls back on its experts, `sides` whether it takes their side; the file of a network does not speak of these.
     """
 
     kind: str
@@ -48,23 +48,24 @@ class Checkpoint:
     training_steps: int | None = None
     examples: Annotated[int, Meta(ge=0, le=MOST_EXAMPLES)] = 0
     fallback: bool = False
+    sides: bool = False
 
     @classmethod
     def of(cls, network: Weighted, profile: str, provenance: str, seed: int, cruise: Action | None = None) -> Self:
         """Describe a network that was trained for a robot with this profile."""
         what = network.architecture
         shapes = dict(what.shapes)
-        examples, fallback = what.examples, what.fallback
-        return cls(
-            what.kind, shapes, what.filters, profile, cruise, provenance, seed, examples=examples, fallback=fallback
-        )
+        made = cls(what.kind, shapes, what.filters, profile, cruise, provenance, seed)
+        return replace(made, **{name: getattr(what, name) for name in _OF_KERNELS})
 
     @property
     def architecture(self) -> Architecture:
         """What the network is. Raises `ValueError` for one that cannot be."""
         if len(self.features) > len(MODALITIES):
             raise ValueError(f"a network of {len(self.features)} features")
-        return Architecture(self.kind, self.features, self.filters, self.examples, fallback=self.fallback)
+        return Architecture(
+            self.kind, self.features, self.filters, self.examples, fallback=self.fallback, sides=self.sides
+        )
 
 
 def save_checkpoint(path: Path, network: Weighted, checkpoint: Checkpoint) -> None:

@@ -14,7 +14,8 @@ mean that says neither. How large a turn they say, whichever side, is
     s(x) = sqrt(k(x)^T P (y * y))                           y [n] the turns of the labels
 
 and where that is larger than the turn above, it turns by g s(x) to the side that the first expert says, if all others
-are quiet and that one is not.
+are quiet and that one is not. It does so if the human's labels say that this is the side to turn to: at least three of
+four of those given where the first expert alone had something to say.
 """
 
 import math
@@ -84,7 +85,8 @@ class KernelNet(DrivingNet):
         action = (k @ self._a).astype(np.float32) * self._gains
         if advice is not SILENCE:
             action += np.float32(unknown(k, self._p)) * advice.action
-            action[ANGULAR] = decided(action[ANGULAR], self._gains[ANGULAR], k @ self._squares, advice.side)
+            if self.architecture.sides:
+                action[ANGULAR] = decided(action[ANGULAR], self._gains[ANGULAR], k @ self._squares, advice.side)
         clipped: FloatArray = np.clip(action, np.float32(-1.0), np.float32(1.0))
         return clipped
 

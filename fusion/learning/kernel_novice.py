@@ -7,7 +7,7 @@ from functools import partial
 
 import numpy as np
 
-from lira.fusion.inference.kernel_net import ANGULAR, NEVER, Doubles, KernelNet
+from lira.fusion.inference.kernel_net import ANGULAR, NEVER, QUIET, Doubles, KernelNet
 from lira.fusion.learning.labels import Label, mirror
 from lira.fusion.learning.learned_policy import Contradiction, Part, Together
 from lira.fusion.learning.novice import LearningSettings, Novice
@@ -16,6 +16,7 @@ from lira.fusion.preprocess import Features
 from lira.hal.messages import Action, Driver, FloatArray
 
 ROUNDING = 1e-4  # of what a file holds in single precision: where it was proven it is not to doubt
+AGREED = 0.75  # share of the human's turns to the side of the first expert, from which on that one is asked
 MOST_MET = 4096  # states that wait to be measured: 26 MB with 800 examples
 
 
@@ -33,6 +34,7 @@ class KernelNovice(Novice):
         self._given: list[tuple[str, Action]] = []  # who gave each label, and what it says
         self._group = 0
         self._limit = math.inf
+        self._agreed: list[bool] = []  # whether a human's label turns to the side of the first expert, who spoke alone
         self._met: list[Doubles] = []  # k [n] of states of its proving runs that `limit` does not know yet
         self.ridge = KernelRidge(dict(zip(sees.shapes, sees.trunk_sizes, strict=True)), settings)
 
@@ -82,6 +84,9 @@ class KernelNovice(Novice):
         for each in (label, mirror(label)) if self._mirrored else (label,):
             x = self._x(each.features)
             self.ridge.add(x, each.action, each.weight, human=human, group=self._group, label=self.stored)
+        side = self._network.advice(label.features).side
+        if human and side and abs(label.action[ANGULAR]) >= QUIET:
+            self._agreed.append(label.action[ANGULAR] * side > 0.0)
         self._given.append((label.source, label.action))
         self.stored += 1
         self.training_steps += 1
@@ -121,7 +126,12 @@ class KernelNovice(Novice):
             "gain": np.array([self.ridge.gain], np.float32),
             "limit": np.array([min((1.0 + ROUNDING) * self.limit, NEVER)], np.float32),
         }
-        return KernelNet(replace(self._network.architecture, examples=int(used.sum())), weights)
+        return KernelNet(replace(self._network.architecture, examples=int(used.sum()), sides=self.takes_sides), weights)
+
+    @property
+    def takes_sides(self) -> bool:
+        """Whether it turns to its first expert's side where it is undecided: the human's labels say so of that one."""
+        return sum(self._agreed) >= AGREED * len(self._agreed) > 0.0
 
     def _alone(self, seen: Sequence[Features], *, proving: bool) -> list[Action]:
         x = np.array([self._x(each) for each in seen])
@@ -129,7 +139,7 @@ class KernelNovice(Novice):
         likeness = self.ridge.k(x if len(seen) > 1 else x[0]).reshape(len(seen), -1)
         if proving:
             self._meet(likeness)
-        return self.ridge.actions(likeness, self.ridge.gain, advice)
+        return self.ridge.actions(likeness, self.ridge.gain, advice, sides=self.takes_sides)
 
     def _meet(self, k: Doubles) -> None:
         """Keep the kernel values [m, n] of states of a proving run."""

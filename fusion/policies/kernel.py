@@ -257,17 +257,18 @@ class KernelRidge:
         return action
 
     def actions(
-        self, k: Doubles, gain: float = 1.0, advice: Sequence[Advice] | None = None
+        self, k: Doubles, gain: float = 1.0, advice: Sequence[Advice] | None = None, *, sides: bool = False
     ) -> list[tuple[float, float]]:
         """The same of several states, of which these are the kernel values [m, n].
 
-        With the first expert's `advice` for each as `inference/kernel_net.py` tells.
+        With the first expert's `advice` for each as `inference/kernel_net.py` tells, also on `sides`.
         """
         actions = self.fit.mean(k) * (1.0, gain)
         if advice is not None:
-            first, side = np.array([each.action for each in advice]), np.array([each.side for each in advice])
-            actions += unknown(k, self.fit.p)[:, None] * first
-            actions[:, ANGULAR] = decided(actions[:, ANGULAR], gain, k @ self.fit.squares, side)
+            actions += unknown(k, self.fit.p)[:, None] * np.array([each.action for each in advice])
+            if sides:
+                asked = np.array([each.side for each in advice])
+                actions[:, ANGULAR] = decided(actions[:, ANGULAR], gain, k @ self.fit.squares, asked)
         return [(clipped(linear), clipped(angular)) for linear, angular in actions.tolist()]
 
     @property

@@ -59,6 +59,9 @@ def novice_of_plus(falls_back=True):
         novice.remember(Label(seeing(SHAPES, k), tuple(rng.uniform(-1.0, 1.0, 2).tolist()), source))
     for turn in (1.0, -1.0):  # full steer to either side
         novice.remember(Label(nothing_near(seeing(SHAPES, 15)), (1.0, turn), "human", 3.0))
+    for _ in range(20):  # whom the human agrees with
+        side = sees.advice(nothing_near(seeing(SHAPES, 7))).side or 1.0
+        novice.remember(Label(nothing_near(seeing(SHAPES, 7)), (1.0, side), "human"))
     return novice.frozen()
 
 

@@ -165,10 +165,25 @@ def test_where_labels_say_full_steer_to_either_side_it_turns_to_the_one_that_its
     )
     for _ in range(20):
         for turn in (1.0, -1.0):
-            learner.remember(Label(seen(77), (1.0, turn), "human", 3.0))
+            learner.remember(Label(seen(77), (1.0, turn), "camera", 3.0))
+    assert learner.alone(seen(77))[1] == pytest.approx(0.0, abs=0.1)  # nobody has said that this expert is right
+    learner.remember(Label(seen(77), (1.0, side or 1.0), "human", 0.01))
     assert learner.alone(seen(77))[1] == pytest.approx(side, abs=0.1)
     assert learner.act(seen(77))[1] == pytest.approx(0.0, abs=0.1)  # it is taught as ever
     assert learner.frozen().act(seen(77)) == pytest.approx(learner.alone(seen(77)), abs=1e-4)
+
+
+def test_an_expert_to_whose_side_the_human_does_not_turn_is_not_asked_for_it():
+    did = np.array(CAMERA.driving().act(seen(77)))
+    learner = novice(cruises=[tuple(did - (0.0, 0.5)), cruises(lidar_quiet=True)[1]], mirrored=False)
+    for turn in (1.0, 1.0, 1.0):
+        learner.remember(Label(seen(77), (1.0, turn), "human"))
+    assert learner.takes_sides
+    learner.remember(Label(seen(77), (1.0, -1.0), "human"))
+    assert learner.takes_sides  # three of four
+    learner.remember(Label(seen(77), (1.0, -1.0), "human"))
+    assert not learner.takes_sides
+    assert not learner.frozen().architecture.sides
 
 
 def test_labels_with_one_mind_are_followed_whatever_the_experts_say():

@@ -173,6 +173,8 @@ def _advised(
     asked = graph.add("Less", [graph.add("Max", [none, *loudest]), quiet])
     first = graph.add("Where", [asked, actions[0], none])
     filled = graph.add("Add", [action, graph.add("Mul", [graph.cast(unknown), first])])
+    if not what.sides:
+        return filled
     row = graph.constant("row", np.array([0]))
     linear, turn = (graph.add("Gather", [filled, each], axis=1) for each in (row, column))
     its_turn = graph.add("Gather", [away[0], column], axis=1)
