@@ -85,11 +85,11 @@ def test_an_observation_has_every_sensor_with_its_capture_time(rig):
 def test_observations_are_numbered_in_order_and_time_goes_on(rig):
     armed(rig)
     seen = []
-    for _ in range(4):
+    while len({seq for seq, _ in seen}) < 4:
+        assert len(seen) < (STEPS if rig.real_time else 4)  # one that lags is read twice
         step(rig, STOP)
         seen.append((rig.robot.read().seq, rig.robot.now()))
     assert seen == sorted(set(seen))
-    assert len({seq for seq, _ in seen}) == 4
 
 
 def test_waiting_lets_time_pass_and_the_past_is_not_waited_for(rig):

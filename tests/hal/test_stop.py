@@ -18,11 +18,13 @@ from lira.tools.launch.processes import ChildProcess
 DRIVER = """
 import sys
 from lira.hal.bus.bus import Bus
-from lira.hal.messages import STOP, Command, Twist
+from lira.hal.messages import STOP, Command, Reason, Twist
 from lira.hal.client.connect import open_remote
 robot = open_remote(Bus(sys.argv[1], connect=sys.argv[2]))
-for step in range(1000):
-    robot.drive(Command(STOP if step < 3 else Twist(0.5, 0.0), robot.now(), answers=robot.read().seq))
+twist = STOP
+for _ in range(1000):
+    applied = robot.drive(Command(twist, robot.now(), answers=robot.read().seq))
+    twist = STOP if applied.reason is Reason.NEUTRAL_FIRST else Twist(0.5, 0.0)  # begins again after a pause
     robot.wait(robot.now() + robot.profile.period_s)
 """
 
