@@ -4,14 +4,16 @@ Where Keras and TensorFlow are installed (`pip install keras tensorflow-cpu`; th
 these, too.
 
 Where the processor has bfloat16 (the learner uses it where there is AVX512-BF16 or AMX), a step from scratch is 1.8 to
-2.2 times as fast as Keras at f = 16, and 2.4 to 2.5 times at f = 32; in float32 1.2 times. With f = 16 it is 22 GFLOP,
-nearly eight tenths of them the second convolution forward and back. What is left with bfloat16 is memory: arrays of
-1.8 MB go through the rectifier, the pooling and Adam, and nothing that was tried made that less:
+2.2 times as fast as Keras at f = 16, and 2.3 to 2.6 times (median of six runs: 2.5) at f = 32; in float32 1.2 times.
+With f = 16 it is 22 GFLOP, nearly eight tenths of them the second convolution forward and back. What is left with
+bfloat16 is memory: arrays of 1.8 MB go through the rectifier, the pooling and Adam, and nothing that was tried made
+that less:
 
 - the first convolution as a product of matrices (nine rows of shifted pictures), or all of the trunk's way back written
   out into arrays that are kept: as fast as now with bfloat16, 5 to 15 % faster in float32;
 - the fusion layers' large product in bfloat16, too: as fast as now, as its weights have to be converted each time;
 - eight pictures at a time, which stay in the cache: slower, each call costs too much;
+- large pages for the heap; the rectifier within the first convolution's pass forward: as fast as now;
 - in float32 products of matrices with half as many multiplications (Winograd's F(4, 3) along rows): 2 to 6 % at f = 16,
   15 to 19 % at f = 32; what is saved goes into rewriting rows.
 """
