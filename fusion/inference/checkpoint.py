@@ -1,7 +1,7 @@
 """Networks on disk: a .safetensors file with the weights and, as text, where they come from. No pickle."""
 
 import json
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Annotated, Any, Self
 
@@ -55,8 +55,8 @@ class Checkpoint:
         """Describe a network that was trained for a robot with this profile."""
         what = network.architecture
         shapes = dict(what.shapes)
-        made = cls(what.kind, shapes, what.filters, profile, cruise, provenance, seed)
-        return replace(made, **{name: getattr(what, name) for name in _OF_KERNELS})
+        of_kernel = {name: getattr(what, name) for name in _OF_KERNELS}
+        return cls(what.kind, shapes, what.filters, profile, cruise, provenance, seed, **of_kernel)
 
     @property
     def architecture(self) -> Architecture:

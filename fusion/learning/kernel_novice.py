@@ -81,12 +81,11 @@ class KernelNovice(Novice):
         if not self._given or self._given[-1][0] != label.source:
             self._group += 1
         human = label.source == Driver.HUMAN
+        if human and abs(label.action[ANGULAR]) >= QUIET and (side := self._network.advice(label.features).side):
+            self._agreed.append(label.action[ANGULAR] * side > 0.0)
         for each in (label, mirror(label)) if self._mirrored else (label,):
             x = self._x(each.features)
             self.ridge.add(x, each.action, each.weight, human=human, group=self._group, label=self.stored)
-        side = self._network.advice(label.features).side
-        if human and side and abs(label.action[ANGULAR]) >= QUIET:
-            self._agreed.append(label.action[ANGULAR] * side > 0.0)
         self._given.append((label.source, label.action))
         self.stored += 1
         self.training_steps += 1
@@ -134,8 +133,9 @@ class KernelNovice(Novice):
         return sum(self._agreed) >= AGREED * len(self._agreed) > 0.0
 
     def _alone(self, seen: Sequence[Features], *, proving: bool) -> list[Action]:
-        x = np.array([self._x(each) for each in seen])
-        advice = [self._network.advice(each) for each in seen]
+        # In pairs: a trunk remembers what it saw last.
+        looks = [(self._x(each), self._network.advice(each)) for each in seen]
+        x, advice = np.array([each for each, _ in looks]), [each for _, each in looks]
         likeness = self.ridge.k(x if len(seen) > 1 else x[0]).reshape(len(seen), -1)
         if proving:
             self._meet(likeness)

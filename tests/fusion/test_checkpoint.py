@@ -1,5 +1,6 @@
 import json
 import os
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -8,12 +9,15 @@ from safetensors.numpy import save_file
 
 from lira.fusion.experts.files import shipped_path
 from lira.fusion.inference.checkpoint import Checkpoint, load_checkpoint, save_checkpoint
+from lira.fusion.inference.kernel_net import KernelNet
 from lira.fusion.inference.networks import DrivingNet
 from lira.fusion.preprocess import Features
 from lira.hal.errors import StorageError
 from lira.hal.profile import load_profile
 
 SEEN = noise(101)
+FALLS_BACK = kernel_net(101, 16, cruises=[(1.0, 0.0), (0.9, 0.1)])
+TAKES_SIDES = KernelNet(replace(FALLS_BACK.architecture, sides=True), FALLS_BACK.weights())
 SHAPES = shapes(101)
 
 
@@ -32,7 +36,8 @@ def checkpoint(kind="fusion", **changes) -> Checkpoint:
         (lidar_net(101, seed=2), checkpoint("lidar", provenance='lira train-expert lidar "ä"')),
         (fusion_net(101, 16, seed=3), checkpoint()),
         (kernel_net(101, 16), checkpoint("kernel")),
-        (kernel_net(101, 16, cruises=[(1.0, 0.0), (0.9, 0.1)]), checkpoint("kernel", fallback=True)),
+        (FALLS_BACK, checkpoint("kernel", fallback=True)),
+        (TAKES_SIDES, checkpoint("kernel", fallback=True, sides=True)),
     ],
 )
 def test_what_is_saved_is_loaded(tmp_path, network, about):

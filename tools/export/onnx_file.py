@@ -91,6 +91,10 @@ class Graph:
         """In single precision."""
         return self.add("Cast", [x], to=TensorProto.FLOAT)
 
+    def column(self, x: str, k: int) -> str:
+        """Column k of x [n, columns], [n, 1]."""
+        return self.add("Gather", [x, self.constant(f"column_{len(self.nodes)}", np.array([k]))], axis=1)
+
     def dense(self, x: str, weights: Weights, layer: str) -> str:
         """y = W x + b."""
         named = [self.constant(name, weights[name]) for name in (f"{layer}.weight", f"{layer}.bias")]
@@ -149,8 +153,11 @@ def _kernel(graph: Graph, what: Architecture, weights: Weights, seen: Sequence[s
     rest = graph.add("Sub", [one, graph.add("ReduceSum", [known, axis], keepdims=1)])
     unknown = graph.add("Max", [rest, graph.constant("nothing", np.float64(0.0))])
     if what.fallback:
-        squares = graph.add("MatMul", [values, graph.constant("squares", p @ weights["y"][:, ANGULAR:] ** 2)])
-        turned = _advised(graph, what, weights, seen, turned, unknown, squares)
+        first, side = _advice(graph, what, weights, seen)
+        turned = graph.add("Add", [turned, graph.add("Mul", [graph.cast(unknown), first])])
+        if what.sides:
+            squares = graph.add("MatMul", [values, graph.constant("squares", p @ weights["y"][:, ANGULAR:] ** 2)])
+            turned = _decided(graph, turned, weights["gain"], squares, side)
     limits = [graph.constant("low", np.float32(-1.0)), graph.constant("high", np.float32(1.0))]
     graph.add("Clip", [turned, *limits], "action")
     spread = graph.add("Sqrt", [unknown])
@@ -158,30 +165,27 @@ def _kernel(graph: Graph, what: Architecture, weights: Weights, seen: Sequence[s
     graph.add("Mul", [graph.cast(spread), scale], "deviation")
 
 
-def _advised(
-    graph: Graph, what: Architecture, weights: Weights, seen: Sequence[str], action: str, unknown: str, squares: str
-) -> str:
-    """The action with the first expert's advice, see `KernelNet.advice` and `decided`."""
+def _advice(graph: Graph, what: Architecture, weights: Weights, seen: Sequence[str]) -> tuple[str, str]:
+    """What the first expert says where all others are quiet, see `KernelNet.advice`: its action and its side."""
     layers = [f"{trunk}_out" for trunk in what.trunks.values()]
     actions = [graph.add("Tanh", [graph.dense(x, weights, layer)]) for x, layer in zip(seen, layers, strict=True)]
-    column, none = graph.constant("column", np.array([ANGULAR])), graph.constant("none", np.float32(0.0))
-    quiet = graph.constant("quiet", np.float32(QUIET))
+    quiet, none = graph.constant("quiet", np.float32(QUIET)), graph.constant("none", np.float32(0.0))
     away = [
         graph.add("Sub", [each, graph.constant(f"cruise.{k}", weights["cruise"][k])]) for k, each in enumerate(actions)
     ]
     loudest = [graph.add("ReduceMax", [graph.add("Abs", [each])], axes=[1], keepdims=1) for each in away[1:]]
     asked = graph.add("Less", [graph.add("Max", [none, *loudest]), quiet])
-    first = graph.add("Where", [asked, actions[0], none])
-    filled = graph.add("Add", [action, graph.add("Mul", [graph.cast(unknown), first])])
-    if not what.sides:
-        return filled
-    row = graph.constant("row", np.array([0]))
-    linear, turn = (graph.add("Gather", [filled, each], axis=1) for each in (row, column))
-    its_turn = graph.add("Gather", [away[0], column], axis=1)
-    speaks = graph.add("And", [asked, graph.add("GreaterOrEqual", [graph.add("Abs", [its_turn]), quiet])])
+    turn = graph.column(away[0], ANGULAR)
+    speaks = graph.add("And", [asked, graph.add("GreaterOrEqual", [graph.add("Abs", [turn]), quiet])])
+    return graph.add("Where", [asked, actions[0], none]), graph.add("Where", [speaks, graph.add("Sign", [turn]), none])
+
+
+def _decided(graph: Graph, action: str, gain: ArrayLike, squares: str, side: str) -> str:
+    """The action with its turn as `decided` has it."""
+    linear, turn = (graph.column(action, k) for k in (0, ANGULAR))
     root = graph.add("Sqrt", [graph.add("Max", [squares, graph.constant("zero", np.float64(0.0))])])
-    size = graph.add("Mul", [graph.cast(root), graph.constant("gain", weights["gain"])])
+    size = graph.add("Mul", [graph.cast(root), graph.constant("gain", gain)])
     more = graph.add("Add", [graph.add("Abs", [turn]), graph.constant("undecided", np.float32(UNDECIDED))])
-    undecided = graph.add("And", [graph.add("Greater", [size, more]), speaks])
-    to_side = graph.add("Mul", [graph.add("Sign", [its_turn]), size])
-    return graph.add("Concat", [linear, graph.add("Where", [undecided, to_side, turn])], axis=1)
+    undecided = graph.add("And", [graph.add("Greater", [size, more]), graph.add("Cast", [side], to=TensorProto.BOOL)])
+    decided = graph.add("Where", [undecided, graph.add("Mul", [side, size]), turn])
+    return graph.add("Concat", [linear, decided], axis=1)
