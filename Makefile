@@ -32,7 +32,7 @@ $(VENV)/.installed: pyproject.toml constraints.txt
 # Nothing of it is needed to use the project: tests that find none are skipped, and say so.
 foreign: ## ROS 2, a peer of rmw_zenoh and Foxglove's decoders, for tests against them, into .foreign
 	$(PYTHON) -m venv .foreign
-	.foreign/bin/python -m pip install --quiet --requirement tests/foreign.txt
+	.foreign/bin/python -m pip install --quiet --requirement tests/support/foreign.txt
 	npm install --silent --prefix .foreign @foxglove/rosmsg@5 @foxglove/rosmsg2-serialization@3
 
 demo: setup ## teach a robot in the twin, from start to report
@@ -42,7 +42,7 @@ test: setup ## every test: most beside each other, then those that need the mach
 	$(BIN)/python tests/suite.py
 
 test-long: setup ## a scripted person teaches to a pass in real time, by pad and by page: ten minutes or more, alone
-	LIRA_LONG=1 $(BIN)/python -m pytest tests/tools/test_taught_by_hand.py
+	LIRA_LONG=1 $(BIN)/python -m pytest tests/tools/runs/test_taught_by_hand.py
 
 test-fast: setup ## the unit tests, in under a minute
 	$(BIN)/python -m pytest -m unit

@@ -6,7 +6,7 @@ import subprocess
 import sys
 from pathlib import Path
 
-CONFTEST = Path(__file__).parent.parent / "conftest.py"
+CONFTEST = Path(__file__).with_name("conftest.py")
 SKIPS = {
     "test_calls.py": "import pytest\ndef test_it(): pytest.skip('no robot here')\n",
     "test_mark.py": "import pytest\n@pytest.mark.skip(reason='no robot here')\ndef test_it(): pass\n",
@@ -19,7 +19,7 @@ OF_PROCESSES = "import subprocess\n"
 
 def run_pytest(folder, *words, ci=False):
     for name in ("foreign.py", "kinds.py", "loopback.py"):
-        shutil.copy(CONFTEST.with_name(name), folder)
+        shutil.copy(CONFTEST.parent / "support" / name, folder)
     environment = {name: value for name, value in os.environ.items() if name != "CI"} | ({"CI": "true"} if ci else {})
     return subprocess.run(
         [sys.executable, "-m", "pytest", "-q", "-W", "ignore", "--rootdir", str(folder), *words, str(folder)],

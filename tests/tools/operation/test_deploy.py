@@ -30,7 +30,7 @@ from lira.tools.lifecycle.setup import Setup
 from lira.tools.lifecycle.table import PROCESSES, SETS, rows
 from lira.tools.verbs import VERBS
 
-ROOT = Path(__file__).parents[2]
+ROOT = Path(__file__).parents[3]
 TWIN = Setup(processes=SETS["teach"], world="line", twin=("--world", "line"), folder="/home/ada/runs/plus-line")
 ROBOT = Setup(processes=("robot",), endpoint="0.0.0.0:7447", robot=("--base", "/dev/core2", "--without", "camera"))
 FACTS = Facts("/home/ada", 255, (3, 11))

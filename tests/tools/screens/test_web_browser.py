@@ -70,9 +70,21 @@ def sit(driver):
     time.sleep(0.6)  # the bridge looks for a pad three times a second, and the hand has to be seen at rest
 
 
+def drives(press, let_go, applied, what):
+    """A hand that paused while it drove, as on a busy machine, is held until it was seen at rest: it presses again."""
+    for _ in range(3):
+        press()
+        with contextlib.suppress(AssertionError):
+            return wait_until(applied.by_hand, 5.0)
+        let_go()
+        applied.listen(0.6)
+    raise AssertionError(what)
+
+
 def keys(driver, applied):
-    ActionChains(driver).key_down(Keys.SPACE).key_down(Keys.ARROW_UP).perform()
-    wait_until(applied.by_hand, what="the keys do not drive")
+    press = ActionChains(driver).key_down(Keys.SPACE).key_down(Keys.ARROW_UP).perform
+    let_go = ActionChains(driver).key_up(Keys.SPACE).key_up(Keys.ARROW_UP).perform
+    drives(press, let_go, applied, "the keys do not drive")
 
 
 def points(driver, *names):
@@ -98,22 +110,33 @@ def test_keys_drive_and_let_go(page, applied):
 
 
 def test_two_thumbs_drive_and_lifted_let_go(page, applied):
+    def press():
+        touch(page, "touchStart", points(page, "deadman"))
+        touch(page, "touchStart", points(page, "deadman", "stick"))
+
+    def let_go():
+        touch(page, "touchEnd", [])
+
     sit(page)
-    touch(page, "touchStart", points(page, "deadman"))
-    touch(page, "touchStart", points(page, "deadman", "stick"))
-    wait_until(applied.by_hand, what="thumbs do not drive")
-    touch(page, "touchEnd", [])
+    drives(press, let_go, applied, "thumbs do not drive")
+    let_go()
     wait_until(lambda: applied.listen()[-1].source is Source.POLICY, what="control did not go back to the policy")
 
 
 def test_a_pad_in_the_browser_drives_and_its_loss_stops(page, applied):
+    def press():
+        page.execute_script("pad.axes[1] = -1; pad.buttons[4].pressed = true;")
+
+    def let_go():
+        page.execute_script("pad.axes[1] = 0; pad.buttons[4].pressed = false;")
+
     sit(page)
-    page.execute_script("pad.axes[1] = -1; pad.buttons[4].pressed = true;")
-    wait_until(applied.by_hand, what="the pad does not drive")
+    drives(press, let_go, applied, "the pad does not drive")
     assert page.find_element(By.ID, "pad").text.endswith("A pad")
     page.execute_script("navigator.getGamepads = () => [null];")
     wait_until(lambda: not applied.by_hand())
-    page.execute_script("pad.axes[1] = 0; pad.buttons[4].pressed = false; navigator.getGamepads = () => [pad];")
+    let_go()
+    page.execute_script("navigator.getGamepads = () => [pad];")
 
 
 def hide(driver, _):

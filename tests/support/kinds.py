@@ -10,7 +10,7 @@ from collections.abc import Iterator
 from functools import cache
 from pathlib import Path
 
-ROOT = Path(__file__).parent.parent
+SHARED = Path(__file__).parent
 LONG = os.environ.get("LIRA_LONG") == "1"
 TAKES_LONG = "takes many minutes in real time (make test-long)"
 PROCESSES = (
@@ -36,16 +36,17 @@ PROCESSES = (
     "threading",
     "zenoh",
 )
-COMPUTES = "fresh.py"  # it starts what ends by itself, and as late as it likes
+# They start what ends by itself, and as late as it likes: who uses them computes, or skips.
+TELL_NOTHING = ("fresh.py", "foreign.py", "kinds.py")
 TWIN = ("lira.sim_backend", "lira.fusion.learning", "lira.fusion.policies", "lira.tools", "pybullet", "torch")
 
 
 @cache
 def kind_of(path: Path) -> str:
-    """Return "unit", "twin" or "processes" for a test file, with the helpers beside it that it imports."""
+    """Return "unit", "twin" or "processes" for a test file, with the helpers, beside it or shared, that it imports."""
     names = _imported(path)
-    helpers = [path.parent / f"{name}.py" for name in names if (path.parent / f"{name}.py").is_file()]
-    kinds = {kind_of(helper) for helper in helpers if helper.name != COMPUTES}
+    helpers = {folder / f"{name}.py" for folder in (path.parent, SHARED) for name in names if "." not in name}
+    kinds = {kind_of(helper) for helper in helpers if helper.is_file() and helper.name not in TELL_NOTHING}
     if "processes" in kinds or _any_of(PROCESSES, names) or "e2e" in path.parts or "attack" in path.parts:
         return "processes"
     return "twin" if "twin" in kinds or "fresh" in names or _any_of(TWIN, names) else "unit"

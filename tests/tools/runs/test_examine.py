@@ -3,7 +3,8 @@
 import uuid
 
 import pytest
-from short_trials import SHORT, write_world
+from short_trials import write_world
+from short_worlds import FOR_TRIALS
 
 from lira.fusion.experts.files import shipped_path
 from lira.hal.profile import load_profile
@@ -36,7 +37,7 @@ def lira(tmp_path, capsys):
 
 def test_each_layout_is_told(lira, tmp_path):
     path = tmp_path / "free.toml"
-    path.write_text(SHORT.replace("y_m = 0.1", "y_m = 9.0"))
+    path.write_text(FOR_TRIALS.replace("y_m = 0.1", "y_m = 9.0"))
     status, lines = lira(str(path), *EXAM)
     assert status == 0
     assert "drives layouts 7 to 8 of " in lines[0]

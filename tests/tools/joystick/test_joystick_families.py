@@ -103,5 +103,5 @@ def test_the_rule_is_printed_whole_and_ships(capsys):
     for row in FAMILIES:
         for vendor in row.vendors & {"054c", "057e", "2dc8"}:
             assert vendor in printed
-    text = (Path(__file__).parents[2] / "pyproject.toml").read_text()
+    text = (Path(__file__).parents[3] / "pyproject.toml").read_text()
     assert '"*.rules"' in text

@@ -10,7 +10,7 @@ import pytest
 
 from lira.tools.verbs import VERBS
 
-ROOT = Path(__file__).parents[2]
+ROOT = Path(__file__).parents[3]
 PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").rglob("*.md")), *sorted((ROOT / "tools").glob("*/README.md"))]
 PAGES += [ROOT / name / "README.md" for name in ("hal", "fusion", "robot", "sim_backend")]
 COMMENT = re.compile(r"\s{2,}\S.*$|\s+#.*$")  # what stands behind a command, after two spaces or a #

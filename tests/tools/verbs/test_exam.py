@@ -18,7 +18,7 @@ from lira.tools.verbs.teach.new import KINDS, write_project
 
 pytest_plugins = "pytester"
 
-ROOT = Path(__file__).parents[2]
+ROOT = Path(__file__).parents[3]
 PLUGIN = "lira.tools.exam.plugin"
 PAGE = (ROOT / "docs" / "howto" / "ci.md").read_text(encoding="utf-8")
 HEAVY = ("numpy", "cv2", "zenoh", "msgspec", "torch", "pybullet")

@@ -43,7 +43,7 @@ def cluster(*, workers, threads=1):
     dask = [sys.executable, "-m", "dask"]
     quiet = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL}
     plain = ["--no-dashboard", "--host", "127.0.0.1"]
-    where = Path(__file__).parents[2]
+    where = Path(__file__).parents[3]
     processes = [subprocess.Popen([*dask, "scheduler", *plain, "--port", address.rsplit(":")[-1]], cwd=where, **quiet)]
     try:
         wait_for(lambda: answers(address))
@@ -139,7 +139,7 @@ def test_a_run_that_is_stopped_half_way_goes_on_where_it_was(world, tmp_path):
 @pytest.mark.parametrize("terminal", [True, False])
 def test_progress_is_a_bar_on_a_terminal_and_lines_elsewhere(terminal):
     script = (
-        "import sys; sys.path.insert(0, 'tests/tools')\n"
+        "import sys; sys.path.insert(0, 'tests/tools/experiments')\n"
         "from made_up_outcomes import HOLD, outcome\n"
         "from lira.tools.experiments.playing.runner import Bar\n"
         "with Bar(3, 1) as bar:\n"
@@ -148,7 +148,7 @@ def test_progress_is_a_bar_on_a_terminal_and_lines_elsewhere(terminal):
     ours, theirs = os.openpty() if terminal else os.pipe()
     if terminal:
         termios.tcsetwinsize(theirs, (24, 120))
-    where = Path(__file__).parents[2]
+    where = Path(__file__).parents[3]
     try:
         subprocess.run([sys.executable, "-c", script], stderr=theirs, cwd=where, check=True, timeout=60)
         os.set_blocking(ours, False)
