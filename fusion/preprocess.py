@@ -105,8 +105,9 @@ class Modality:
     """One row. `name` is that of the feature and of the observation's field it is made from.
 
     `sensor` is what measures it, and the name of the expert that sees nothing else. `read` makes the array of a reading
-    and counts what is invalid in it. `trunk` is what part of a network looks at it. A picture is kept in 8 bits, which
-    loses nothing: its values are multiples of 1/255.
+    and counts what is invalid in it. `trunk` is what part of a network looks at it. `free` is what it reads where
+    nothing is, None where no value says so. A picture is kept in 8 bits, which loses nothing: its values are multiples
+    of 1/255.
     """
 
     name: str
@@ -114,6 +115,7 @@ class Modality:
     trunk: Literal["scan", "picture"]
     has: Callable[[RobotProfile], bool]
     read: Callable[[Any, RobotProfile], tuple[FloatArray, int]]
+    free: float | None = None
 
     @property
     def dtype(self) -> type[np.float32] | type[np.uint8]:
@@ -133,6 +135,15 @@ class Modality:
             fits = len(shape) == 2 and shape[0] == shape[1] and LEAST_PX <= shape[0] <= MAX_IMAGE_PX
         if not fits:
             raise ValueError(f"a {self.name} of shape {list(shape)}")
+
+    def halves(self, array: FloatArray) -> tuple[FloatArray, ...]:
+        """The array twice, its first and its last half free; () where nothing is in it, or no value says so."""
+        if self.free is None or float(array.min()) >= self.free:
+            return ()
+        first, last = array.copy(), array.copy()
+        half = array.shape[-1] // 2
+        first[..., :half] = last[..., array.shape[-1] - half :] = self.free
+        return first, last
 
     def keep(self, array: FloatArray) -> NDArray[Any]:
         """Turn an array into what is kept of it."""
@@ -163,8 +174,8 @@ MODALITIES = {
     row.name: row
     for row in (
         Modality("image", "camera", "picture", lambda _: True, _image),
-        Modality("scan", "lidar", "scan", lambda _: True, _scan),
-        Modality("depth", "depth", "picture", lambda profile: profile.depth is not None, _depth),
+        Modality("scan", "lidar", "scan", lambda _: True, _scan, free=1.0),
+        Modality("depth", "depth", "picture", lambda profile: profile.depth is not None, _depth, free=1.0),
     )
 }
 

@@ -26,8 +26,9 @@ class Architecture:
 
     `kind` is the sensor whose expert it is, "fusion" or "kernel". `shapes` are those of the features it looks at, by
     name and in order; `filters` the width of the trunks that see pictures, 0 without any. `examples` is how many a
-    kernel drives by, `fallback` whether it knows what its experts do where it knows nothing itself, and `sides` whether
-    it turns to the side of the first of them where it is undecided; `members` the size of the ensemble beside a novice.
+    kernel drives by, `fallback` whether it knows what its experts do where it knows nothing itself, `halves` whether it
+    asks them again with half of their view free, and `sides` whether it turns to the side of the first of them where it
+    is undecided; `members` the size of the ensemble beside a novice.
     """
 
     kind: str
@@ -36,6 +37,7 @@ class Architecture:
     examples: int = 0
     members: int = 0
     fallback: bool = False
+    halves: bool = False
     sides: bool = False
 
     def __post_init__(self) -> None:

@@ -21,7 +21,7 @@ from lira.hal.profile import MAX_FILTERS
 
 MOST_BYTES = 2**28  # eighty times the largest network that any robot here needs
 MOST_EXAMPLES = 4096
-_OF_KERNELS = ("examples", "fallback", "sides")
+_OF_KERNELS = ("examples", "fallback", "halves", "sides")
 _KEY = "lira"  # the one metadata entry, JSON
 _Share = Annotated[float, Meta(ge=-1.01, le=1.01)]  # of a robot's top speed
 
@@ -34,7 +34,8 @@ class Checkpoint:
     the trunks that see pictures, 0 without any. `cruise` is an expert's measured action (linear, angular) on an empty
     straight course; `provenance` the command that made it. `labels` and `training_steps` are what it took; None for a
     file that was written before they were counted. `examples` is how many a kernel drives by, and `fallback` whether
-    it falls back on its experts, `sides` whether it takes their side; the file of a network does not speak of these.
+    it falls back on its experts, `halves` whether it asks them with half of their view free, `sides` whether it takes
+    the side of the first; the file of a network does not speak of these.
     """
 
     kind: str
@@ -48,6 +49,7 @@ class Checkpoint:
     training_steps: int | None = None
     examples: Annotated[int, Meta(ge=0, le=MOST_EXAMPLES)] = 0
     fallback: bool = False
+    halves: bool = False
     sides: bool = False
 
     @classmethod
@@ -63,9 +65,8 @@ class Checkpoint:
         """What the network is. Raises `ValueError` for one that cannot be."""
         if len(self.features) > len(MODALITIES):
             raise ValueError(f"a network of {len(self.features)} features")
-        return Architecture(
-            self.kind, self.features, self.filters, self.examples, fallback=self.fallback, sides=self.sides
-        )
+        of_kernel = {name: getattr(self, name) for name in _OF_KERNELS}
+        return Architecture(self.kind, self.features, self.filters, **of_kernel)
 
 
 def save_checkpoint(path: Path, network: Weighted, checkpoint: Checkpoint) -> None:

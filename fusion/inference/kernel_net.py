@@ -16,6 +16,11 @@ mean that says neither. How large a turn they say, whichever side, is
 and where that is larger than the turn above, it turns by g s(x) to the side that the first expert says, if all others
 are quiet and that one is not. It does so if the human's labels say that this is the side to turn to: at least three of
 four of those given where the first expert alone had something to say.
+
+An expert that has learned left and right exchanged is quiet, too, before a box straight ahead: it *hesitates*, as is
+found by asking it again with the left half of its view free of anything, and with the right. Where it has something to
+say to either, the novice gets no advice, and where its labels are undecided it turns by g s(x) to the side to which it
+turns itself, however little.
 """
 
 import math
@@ -29,7 +34,7 @@ from numpy.typing import NDArray
 from lira.fusion.inference.architecture import KERNEL, Architecture, Weighted, Weights, head_weights, trunk_weights
 from lira.fusion.inference.layers import Dense
 from lira.fusion.inference.networks import DrivingNet
-from lira.fusion.preprocess import Features
+from lira.fusion.preprocess import MODALITIES, Features
 from lira.hal.messages import Action, FloatArray
 
 QUIET = 0.2  # an expert less than this away from its cruise action has nothing to say, as with `hold` of LIRA-SPF
@@ -43,13 +48,20 @@ Doubles = NDArray[np.float64]
 
 
 class Advice(NamedTuple):
-    """What the first expert says where all others are quiet; nothing, where one of them is not."""
+    """What the first expert says where all others are quiet; nothing, where one of them is not, or hesitates."""
 
     action: FloatArray  # a_1 [2], or zero
     side: float  # of its turn, -1 or 1, or 0 if it does about what it does while cruising
+    hesitation: bool  # one of the others is quiet only because it has as much to say for either side
+
+    def to(self, turn: float, *, sides: bool) -> float:
+        """The side to turn to, -1 or 1, if labels whose mean is `turn` are undecided; 0 for none, a_1's on `sides`."""
+        own = -1.0 if turn < 0.0 else 1.0
+        return own if self.hesitation else self.side * sides
 
 
-SILENCE = Advice(np.zeros(2, np.float32), 0.0)
+SILENCE = Advice(np.zeros(2, np.float32), 0.0, hesitation=False)
+HESITATION = SILENCE._replace(hesitation=True)
 
 
 class KernelNet(DrivingNet):
@@ -64,7 +76,8 @@ class KernelNet(DrivingNet):
     @classmethod
     def from_experts(cls, experts: Sequence[Weighted], cruises: Sequence[Action] | None = None) -> "KernelNet":
         """Build one that sees as the experts do and knows nothing; with their `cruises` it falls back on them."""
-        architecture = replace(Architecture.novice(KERNEL, experts), fallback=cruises is not None)
+        falls_back = cruises is not None
+        architecture = replace(Architecture.novice(KERNEL, experts), fallback=falls_back, halves=falls_back)
         theirs = trunk_weights(experts)
         if cruises is not None:
             theirs |= head_weights(experts) | {"cruise": np.array(cruises, np.float32)}
@@ -77,18 +90,19 @@ class KernelNet(DrivingNet):
 
     def advice(self, seen: Features) -> Advice:
         """What its first expert says of an observation; nothing for one that does not ask."""
-        return self._advice(self.features(seen))
+        return self._advice(seen, self.features(seen))
 
-    def head(self, features: FloatArray) -> FloatArray:
-        """m(x), the turn times g, with its first expert's advice, clipped; `features` are what the trunks have made."""
-        k, advice = self._k(features), self._advice(features)
+    def act(self, seen: Features) -> Action:
+        """m(x), the turn times g, with its first expert's advice, clipped."""
+        features = self.features(seen)
+        k, advice = self._k(features), self._advice(seen, features)
         action = (k @ self._a).astype(np.float32) * self._gains
         if advice is not SILENCE:
             action += np.float32(unknown(k, self._p)) * advice.action
-            if self.architecture.sides:
-                action[ANGULAR] = decided(action[ANGULAR], self._gains[ANGULAR], k @ self._squares, advice.side)
-        clipped: FloatArray = np.clip(action, np.float32(-1.0), np.float32(1.0))
-        return clipped
+            side = advice.to(action[ANGULAR], sides=self.architecture.sides)
+            action[ANGULAR] = decided(action[ANGULAR], self._gains[ANGULAR], k @ self._squares, side)
+        linear, angular = np.clip(action, np.float32(-1.0), np.float32(1.0)).tolist()
+        return linear, angular
 
     def deviation(self, seen: Features) -> Action:
         """sd(x) of the mean's two actions."""
@@ -120,15 +134,26 @@ class KernelNet(DrivingNet):
                 for trunk in self.architecture.trunks.values()
             ]
 
-    def _advice(self, features: FloatArray) -> Advice:
+    def _advice(self, seen: Features, features: FloatArray) -> Advice:
         if not self._heads:
             return SILENCE
         actions = [np.tanh(head(features[part])) for head, part in zip(self._heads, self._parts, strict=True)]
         away = np.array(actions) - self._cruises
         if np.abs(away[1:]).max(initial=0.0) >= QUIET:
             return SILENCE
+        if self.architecture.halves and self._hesitation(seen):
+            return HESITATION
         turn = float(away[0, ANGULAR])
-        return Advice(actions[0], math.copysign(1.0, turn) if abs(turn) >= QUIET else 0.0)
+        return Advice(actions[0], math.copysign(1.0, turn) if abs(turn) >= QUIET else 0.0, hesitation=False)
+
+    def _hesitation(self, seen: Features) -> bool:
+        """Whether one of the others has something to say as soon as half of its view is free."""
+        others = list(zip(self._trunks.items(), self._heads, self._cruises, strict=True))[1:]
+        return any(
+            np.abs(np.tanh(head(trunk.glance(half))) - cruise).max() >= QUIET
+            for (name, trunk), head, cruise in others
+            for half in MODALITIES[name].halves(seen[name])
+        )
 
     def _k(self, features: FloatArray) -> Doubles:
         return kernel(self._x, unit(features, self._parts)[None], self._parts, self._widths)[:, 0]

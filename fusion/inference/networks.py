@@ -19,7 +19,7 @@ from lira.hal.messages import Action, FloatArray
 
 
 class DrivingNet(ABC):
-    """A network as it drives: `features` is what its trunks make of what is seen, `head` turns that into an action."""
+    """A network as it drives: `features` is what its trunks make of what is seen, and `act` what follows from it."""
 
     def __init__(self, architecture: Architecture, weights: Mapping[str, NDArray[Any]]) -> None:
         """Raises `ValueError` for weights that do not fit or are not finite."""
@@ -53,22 +53,17 @@ class DrivingNet(ABC):
         """What the trunks make of an observation [size], one behind the other; the next call writes over it."""
         return np.concatenate([trunk(seen[name]) for name, trunk in self._trunks.items()], out=self._joined)
 
+    @abstractmethod
     def act(self, seen: Features) -> Action:
         """Return the action for one step, in [-1, 1]^2."""
-        linear, angular = self.head(self.features(seen)).tolist()
-        return linear, angular
 
     def act_all(self, seen: Sequence[Features]) -> list[Action]:
         """Return the actions for one step of several robots."""
         return [self.act(each) for each in seen]
 
     @abstractmethod
-    def head(self, features: FloatArray) -> FloatArray:
-        """What the trunks have made [size] -> the action [2]."""
-
-    @abstractmethod
     def _prepare(self, weights: Weights) -> None:
-        """Make what `head` needs."""
+        """Make what `act` needs."""
 
     def _below(self, trunk: str) -> Weights:
         """The weights of a trunk, called as they are within it."""
@@ -79,8 +74,13 @@ class DrivingNet(ABC):
 class LayeredNet(DrivingNet):
     """An expert (trunk -> FC 2) or the thesis's novice (trunks -> 128 -> 128 -> 2), tanh at the end."""
 
+    def act(self, seen: Features) -> Action:
+        """Return the action for one step, in [-1, 1]^2."""
+        linear, angular = self.head(self.features(seen)).tolist()
+        return linear, angular
+
     def head(self, features: FloatArray) -> FloatArray:
-        """The layers behind the trunks."""
+        """The layers behind the trunks: what those have made [size] -> the action [2]."""
         x = features
         for layer in self._layers:
             x = layer(x)

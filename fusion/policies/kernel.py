@@ -266,9 +266,9 @@ class KernelRidge:
         actions = self.fit.mean(k) * (1.0, gain)
         if advice is not None:
             actions += unknown(k, self.fit.p)[:, None] * np.array([each.action for each in advice])
-            if sides:
-                asked = np.array([each.side for each in advice])
-                actions[:, ANGULAR] = decided(actions[:, ANGULAR], gain, k @ self.fit.squares, asked)
+            turns = actions[:, ANGULAR]
+            to = np.array([each.to(turn, sides=sides) for each, turn in zip(advice, turns.tolist(), strict=True)])
+            actions[:, ANGULAR] = decided(turns, gain, k @ self.fit.squares, to)
         return [(clipped(linear), clipped(angular)) for linear, angular in actions.tolist()]
 
     @property

@@ -1,6 +1,7 @@
 """A network as ONNX, run by somebody else's runtime: the same actions, for one observation and for many."""
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -45,6 +46,12 @@ def about(network):
 
 def nothing_near(seen):
     return Features(image=seen["image"], scan=np.ones(SHAPES["scan"], np.float32))
+
+
+def box_ahead(seen, near):
+    scan = np.ones(SHAPES["scan"], np.float32)
+    scan[34:67] = near
+    return Features(image=seen["image"], scan=scan)
 
 
 def seeing_as_experts(falls_back=True):
@@ -110,6 +117,24 @@ def test_one_that_takes_its_first_experts_side_does_the_same():
     got = ask(build(network, about(network)), [undecided, *seen, seeing(SHAPES, 15)])
     expected = [network.act(each) for each in (undecided, *seen, seeing(SHAPES, 15))]
     np.testing.assert_allclose(got["action"], expected, atol=CLOSE)
+
+
+def test_one_that_goes_by_itself_where_an_expert_hesitates_does_the_same():
+    sees = seeing_as_experts()
+    novice = KernelNovice(sees, LearningSettings(), KernelSettings(contradicts=None), mirrored=True)
+    boxes = [box_ahead(seeing(SHAPES, seed), near) for seed in (3, 7, 11) for near in (0.4, 0.5, 0.6)]
+    hesitating = [each for each in boxes if sees.advice(each).hesitation]
+    assert hesitating
+    for each in hesitating:
+        for turn in (1.0, -1.0, 0.5):
+            novice.remember(Label(each, (1.0, turn), "human", 3.0))
+    network = novice.frozen()
+    actions = [network.act(each) for each in boxes]
+    assert max(abs(turn) for _, turn in actions) > 0.7
+    np.testing.assert_allclose(ask(build(network, about(network)), boxes)["action"], actions, atol=CLOSE)
+    before = KernelNet(replace(network.architecture, halves=False), network.weights())
+    actions = [before.act(each) for each in boxes]
+    np.testing.assert_allclose(ask(build(before, about(before)), boxes)["action"], actions, atol=CLOSE)
 
 
 def test_a_file_says_what_it_is_and_the_verb_writes_it(tmp_path, capsys):

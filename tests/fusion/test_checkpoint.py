@@ -17,6 +17,7 @@ from lira.hal.profile import load_profile
 
 SEEN = noise(101)
 FALLS_BACK = kernel_net(101, 16, cruises=[(1.0, 0.0), (0.9, 0.1)])
+AS_BEFORE = KernelNet(replace(FALLS_BACK.architecture, halves=False), FALLS_BACK.weights())
 TAKES_SIDES = KernelNet(replace(FALLS_BACK.architecture, sides=True), FALLS_BACK.weights())
 SHAPES = shapes(101)
 
@@ -36,8 +37,9 @@ def checkpoint(kind="fusion", **changes) -> Checkpoint:
         (lidar_net(101, seed=2), checkpoint("lidar", provenance='lira train-expert lidar "ä"')),
         (fusion_net(101, 16, seed=3), checkpoint()),
         (kernel_net(101, 16), checkpoint("kernel")),
-        (FALLS_BACK, checkpoint("kernel", fallback=True)),
-        (TAKES_SIDES, checkpoint("kernel", fallback=True, sides=True)),
+        (FALLS_BACK, checkpoint("kernel", fallback=True, halves=True)),
+        (TAKES_SIDES, checkpoint("kernel", fallback=True, halves=True, sides=True)),
+        (AS_BEFORE, checkpoint("kernel", fallback=True)),
     ],
 )
 def test_what_is_saved_is_loaded(tmp_path, network, about):

@@ -56,6 +56,17 @@ def test_in_a_mirror_every_array_is_reversed_across_what_is_seen():
     assert other.depth.tolist() == [[1, 0], [3, 2]]
 
 
+def test_half_of_a_view_is_free_where_a_value_says_so():
+    scan = np.linspace(0.1, 0.9, 5, dtype=np.float32)
+    first, last = MODALITIES["scan"].halves(scan)
+    assert first.tolist() == [1.0, 1.0, *scan[2:].tolist()]  # what is in the middle stays
+    assert last.tolist() == [*scan[:3].tolist(), 1.0, 1.0]
+    depth = np.zeros((6, 6), np.float32)
+    assert [half.sum() for half in MODALITIES["depth"].halves(depth)] == [18.0, 18.0]
+    assert MODALITIES["scan"].halves(np.ones(5, np.float32)) == ()  # nothing is in it
+    assert MODALITIES["image"].halves(depth) == ()
+
+
 class TestChoice:
     def test_by_default_a_robot_learns_from_image_and_scan(self):
         assert shapes_of(SIM) == {"image": (32, 32), "scan": (101,)}

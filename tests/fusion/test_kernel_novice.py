@@ -1,13 +1,14 @@
 """The novice that learns from each label at once, and the file that drives without it."""
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 from nets import camera_net, lidar_net
 
 from lira.fusion.inference.checkpoint import Checkpoint, load_checkpoint, save_checkpoint
-from lira.fusion.inference.kernel_net import KernelNet
+from lira.fusion.inference.kernel_net import SILENCE, KernelNet
 from lira.fusion.learning import kernel_novice
 from lira.fusion.learning.kernel_novice import KernelNovice
 from lira.fusion.learning.labels import Label, mirror
@@ -21,6 +22,7 @@ from lira.hal.profile import load_profile
 from lira.tools.runs.build import build_method
 
 BINS, FILTERS = 21, 4
+PRETRAINED = Path(kernel_novice.__file__).parents[1] / "pretrained"
 
 
 def seen(seed):
@@ -159,18 +161,60 @@ def test_where_another_expert_has_something_to_say_it_stands():
 )
 def test_where_labels_say_full_steer_to_either_side_it_turns_to_the_one_that_its_first_expert_says(camera, lidar, side):
     """To neither where the lidar expert has something to say, too, or where neither has."""
-    did = [np.array(expert.driving().act(seen(77))) for expert in (CAMERA, LIDAR)]
+    here = Features(image=seen(77).image, scan=np.ones(BINS, np.float32))
+    did = [np.array(expert.driving().act(here)) for expert in (CAMERA, LIDAR)]
     learner = novice(
         cruises=[tuple(each - (0.0, off)) for each, off in zip(did, (camera, lidar), strict=True)], mirrored=False
     )
     for _ in range(20):
         for turn in (1.0, -1.0):
-            learner.remember(Label(seen(77), (1.0, turn), "camera", 3.0))
-    assert learner.alone(seen(77))[1] == pytest.approx(0.0, abs=0.1)  # nobody has said that this expert is right
-    learner.remember(Label(seen(77), (1.0, side or 1.0), "human", 0.01))
-    assert learner.alone(seen(77))[1] == pytest.approx(side, abs=0.1)
-    assert learner.act(seen(77))[1] == pytest.approx(0.0, abs=0.1)  # it is taught as ever
-    assert learner.frozen().act(seen(77)) == pytest.approx(learner.alone(seen(77)), abs=1e-4)
+            learner.remember(Label(here, (1.0, turn), "camera", 3.0))
+    assert learner.alone(here)[1] == pytest.approx(0.0, abs=0.1)  # nobody has said that this expert is right
+    learner.remember(Label(here, (1.0, side or 1.0), "human", 0.01))
+    assert learner.alone(here)[1] == pytest.approx(side, abs=0.1)
+    assert learner.act(here)[1] == pytest.approx(0.0, abs=0.1)  # it is taught as ever
+    assert learner.frozen().act(here) == pytest.approx(learner.alone(here), abs=1e-4)
+
+
+def box(left):
+    """A scan of the sizes that the project's experts see, with a box at 0.5 m, so many bins left of its middle."""
+    scan = np.ones(101, np.float32)
+    scan[50 + left - 16 : 50 + left + 17] = 0.5
+    return Features(image=np.ones((32, 32), np.float32), scan=scan)
+
+
+def of_the_projects_experts():
+    """A novice of the experts that come with the project, and what it sees with; the camera's is always quiet here."""
+    loaded = [load_checkpoint(PRETRAINED / f"thesis-sim-{name}.safetensors") for name in ("camera", "lidar")]
+    (camera, _), (_, of_lidar) = loaded
+    sees = KernelNet.from_experts([network for network, _ in loaded], [camera.act(box(0)), of_lidar.cruise])
+    return KernelNovice(sees, LearningSettings(), KernelSettings(), mirrored=False), sees
+
+
+def test_an_expert_that_is_quiet_before_a_box_straight_ahead_hesitates():
+    _, sees = of_the_projects_experts()
+    assert sees.advice(box(0)).hesitation
+    assert not any(sees.advice(box(0)).action)
+    for left in (-20, 20):  # there it says something
+        assert sees.advice(box(left)) is SILENCE
+    nothing = Features(image=box(0).image, scan=np.ones(101, np.float32))
+    assert not sees.advice(nothing).hesitation
+    assert any(sees.advice(nothing).action)
+
+
+@pytest.mark.parametrize("own", [1.0, -1.0])
+def test_where_another_expert_hesitates_and_labels_are_undecided_it_turns_to_its_own_side(own):
+    learner, _ = of_the_projects_experts()
+    for turn in (*(1.0, -1.0) * 20, own):
+        learner.remember(Label(box(0), (1.0, turn), "human", 3.0))
+    assert abs(learner.act(box(0))[1]) < 0.2  # it is taught as ever
+    assert learner.alone(box(0))[1] * own > 0.8
+    frozen = learner.frozen()
+    assert frozen.act(box(0)) == pytest.approx(learner.alone(box(0)), abs=1e-4)
+    before = KernelNet(
+        replace(frozen.architecture, halves=False), frozen.weights()
+    )  # as a file says that was proven so
+    assert abs(before.act(box(0))[1]) < 0.3
 
 
 def test_an_expert_to_whose_side_the_human_does_not_turn_is_not_asked_for_it():

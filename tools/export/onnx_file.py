@@ -21,6 +21,7 @@ from lira.fusion.inference.checkpoint import Checkpoint
 from lira.fusion.inference.kernel_net import ANGULAR, QUIET, UNDECIDED, kernel, parts
 from lira.fusion.inference.layers import SLOPE
 from lira.fusion.inference.networks import DrivingNet
+from lira.fusion.preprocess import MODALITIES
 from lira.hal.errors import StorageError
 
 OPSET = 17
@@ -42,7 +43,7 @@ def build(network: DrivingNet, checkpoint: Checkpoint) -> onnx.ModelProto:
     """Make the model, with what the checkpoint says of itself as metadata."""
     what, weights = network.architecture, network.weights()
     graph = Graph()
-    seen = [_trunk(graph, what, weights, name) for name in what.shapes]
+    seen = [_trunk(graph, what, weights, name, name) for name in what.shapes]
     about = {name: value if isinstance(value, str) else json.dumps(value) for name, value in asdict(checkpoint).items()}
     outputs = ["action"]
     if what.kind == KERNEL:
@@ -74,11 +75,16 @@ class Graph:
 
     def __init__(self) -> None:
         self.nodes: list[onnx.NodeProto] = []
-        self.constants: list[onnx.TensorProto] = []
+        self._constants: dict[str, onnx.TensorProto] = {}
+
+    @property
+    def constants(self) -> list[onnx.TensorProto]:
+        """All of them, in order."""
+        return list(self._constants.values())
 
     def constant(self, name: str, numbers: ArrayLike) -> str:
-        """Add numbers."""
-        self.constants.append(numpy_helper.from_array(np.asarray(numbers, order="C"), name))
+        """Add numbers; those that have this name already are the same."""
+        self._constants.setdefault(name, numpy_helper.from_array(np.asarray(numbers, order="C"), name))
         return name
 
     def add(self, kind: str, inputs: Sequence[str], output: str | None = None, **attributes: Any) -> str:
@@ -109,13 +115,13 @@ def _value(name: str, shape: Sequence[int]) -> onnx.ValueInfoProto:
     return helper.make_tensor_value_info(name, TensorProto.FLOAT, ["n", *shape])
 
 
-def _trunk(graph: Graph, what: Architecture, weights: Weights, feature: str) -> str:
-    """What looks at one feature, [n, size]."""
+def _trunk(graph: Graph, what: Architecture, weights: Weights, feature: str, seen: str) -> str:
+    """What looks at one feature, as it was `seen`, [n, size]."""
     trunk = what.trunks[feature]
     if len(what.shapes[feature]) == 1:
-        hidden = graph.rectified(graph.dense(feature, weights, f"{trunk}.fc1"))
+        hidden = graph.rectified(graph.dense(seen, weights, f"{trunk}.fc1"))
         return graph.rectified(graph.dense(hidden, weights, f"{trunk}.fc2"))
-    hidden = graph.add("Unsqueeze", [feature, graph.constant(f"{trunk}.channel", np.array([1]))])
+    hidden = graph.add("Unsqueeze", [seen, graph.constant(f"{trunk}.channel", np.array([1]))])
     for layer in (f"{trunk}.conv1", f"{trunk}.conv2"):
         named = [graph.constant(name, weights[name]) for name in (f"{layer}.weight", f"{layer}.bias")]
         hidden = graph.rectified(graph.add("Conv", [hidden, *named]))
@@ -153,11 +159,10 @@ def _kernel(graph: Graph, what: Architecture, weights: Weights, seen: Sequence[s
     rest = graph.add("Sub", [one, graph.add("ReduceSum", [known, axis], keepdims=1)])
     unknown = graph.add("Max", [rest, graph.constant("nothing", np.float64(0.0))])
     if what.fallback:
-        first, side = _advice(graph, what, weights, seen)
+        first, side, hesitation = _advice(graph, what, weights, seen)
         turned = graph.add("Add", [turned, graph.add("Mul", [graph.cast(unknown), first])])
-        if what.sides:
-            squares = graph.add("MatMul", [values, graph.constant("squares", p @ weights["y"][:, ANGULAR:] ** 2)])
-            turned = _decided(graph, turned, weights["gain"], squares, side)
+        squares = graph.add("MatMul", [values, graph.constant("squares", p @ weights["y"][:, ANGULAR:] ** 2)])
+        turned = _decided(graph, turned, weights["gain"], squares, _to(graph, turned, side, hesitation))
     limits = [graph.constant("low", np.float32(-1.0)), graph.constant("high", np.float32(1.0))]
     graph.add("Clip", [turned, *limits], "action")
     spread = graph.add("Sqrt", [unknown])
@@ -165,19 +170,57 @@ def _kernel(graph: Graph, what: Architecture, weights: Weights, seen: Sequence[s
     graph.add("Mul", [graph.cast(spread), scale], "deviation")
 
 
-def _advice(graph: Graph, what: Architecture, weights: Weights, seen: Sequence[str]) -> tuple[str, str]:
-    """What the first expert says where all others are quiet, see `KernelNet.advice`: its action and its side."""
-    layers = [f"{trunk}_out" for trunk in what.trunks.values()]
-    actions = [graph.add("Tanh", [graph.dense(x, weights, layer)]) for x, layer in zip(seen, layers, strict=True)]
+def _advice(graph: Graph, what: Architecture, weights: Weights, seen: Sequence[str]) -> tuple[str, str, str]:
+    """What `Advice` says: the first expert's action and side where all others are quiet, and whether one hesitates."""
     quiet, none = graph.constant("quiet", np.float32(QUIET)), graph.constant("none", np.float32(0.0))
-    away = [
-        graph.add("Sub", [each, graph.constant(f"cruise.{k}", weights["cruise"][k])]) for k, each in enumerate(actions)
+    whole = [_away(graph, what, weights, name, x) for name, x in zip(what.shapes, seen, strict=True)]
+    halves = [
+        _away(graph, what, weights, name, _trunk(graph, what, weights, name, half))
+        for name in list(what.shapes)[1:]
+        for half in (_halves(graph, what, name) if what.halves else ())
     ]
-    loudest = [graph.add("ReduceMax", [graph.add("Abs", [each])], axes=[1], keepdims=1) for each in away[1:]]
-    asked = graph.add("Less", [graph.add("Max", [none, *loudest]), quiet])
-    turn = graph.column(away[0], ANGULAR)
+    still = graph.add("Less", [_loudest(graph, none, [away for _, away in whole[1:]]), quiet])
+    stirs = graph.add("GreaterOrEqual", [_loudest(graph, none, [away for _, away in halves]), quiet])
+    hesitation = graph.add("And", [still, stirs])
+    asked = graph.add("And", [still, graph.add("Not", [stirs])])
+    action, away = whole[0]
+    turn = graph.column(away, ANGULAR)
     speaks = graph.add("And", [asked, graph.add("GreaterOrEqual", [graph.add("Abs", [turn]), quiet])])
-    return graph.add("Where", [asked, actions[0], none]), graph.add("Where", [speaks, graph.add("Sign", [turn]), none])
+    side = graph.add("Where", [speaks, graph.add("Sign", [turn]), none]) if what.sides else none
+    return graph.add("Where", [asked, action, none]), side, hesitation
+
+
+def _away(graph: Graph, what: Architecture, weights: Weights, feature: str, x: str) -> tuple[str, str]:
+    """The action of the expert that sees a feature, by what its trunk made of it, and how far that is from cruising."""
+    trunk = what.trunks[feature]
+    action = graph.add("Tanh", [graph.dense(x, weights, f"{trunk}_out")])
+    cruise = weights["cruise"][list(what.shapes).index(feature)]
+    return action, graph.add("Sub", [action, graph.constant(f"{trunk}_cruise", cruise)])
+
+
+def _halves(graph: Graph, what: Architecture, feature: str) -> tuple[str, ...]:
+    """What `Modality.halves` makes of a feature."""
+    nothing, width = MODALITIES[feature].free, what.shapes[feature][-1]
+    if nothing is None:
+        return ()
+    free, place = graph.constant(f"{feature}_free", np.float32(nothing)), np.arange(width)
+    first = graph.constant(f"{feature}_first", place < width // 2)
+    last = graph.constant(f"{feature}_last", place >= width - width // 2)
+    return graph.add("Where", [first, free, feature]), graph.add("Where", [last, free, feature])
+
+
+def _loudest(graph: Graph, none: str, away: Sequence[str]) -> str:
+    """The largest of all these numbers, or none, [n, 1]."""
+    most = [graph.add("ReduceMax", [graph.add("Abs", [each])], axes=[1], keepdims=1) for each in away]
+    return graph.add("Max", [none, *most])
+
+
+def _to(graph: Graph, action: str, side: str, hesitation: str) -> str:
+    """The side to turn to, as `Advice.to` has it."""
+    none, left = graph.constant("none", np.float32(0.0)), graph.constant("left", np.float32(1.0))
+    right = graph.add("Less", [graph.column(action, ANGULAR), none])
+    own = graph.add("Where", [right, graph.add("Neg", [left]), left])
+    return graph.add("Where", [hesitation, own, side])
 
 
 def _decided(graph: Graph, action: str, gain: ArrayLike, squares: str, side: str) -> str:
