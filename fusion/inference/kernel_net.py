@@ -54,7 +54,7 @@ class Advice(NamedTuple):
     side: float  # of its turn, -1 or 1, or 0 if it does about what it does while cruising
     hesitation: bool  # one of the others is quiet only because it has as much to say for either side
 
-    def to(self, turn: float, *, sides: bool) -> float:
+    def side_for(self, turn: float, *, sides: bool) -> float:
         """The side to turn to, -1 or 1, if labels whose mean is `turn` are undecided; 0 for none, a_1's on `sides`."""
         own = -1.0 if turn < 0.0 else 1.0
         return own if self.hesitation else self.side * sides
@@ -99,7 +99,7 @@ class KernelNet(DrivingNet):
         action = (k @ self._a).astype(np.float32) * self._gains
         if advice is not SILENCE:
             action += np.float32(unknown(k, self._p)) * advice.action
-            side = advice.to(action[ANGULAR], sides=self.architecture.sides)
+            side = advice.side_for(action[ANGULAR], sides=self.architecture.sides)
             action[ANGULAR] = decided(action[ANGULAR], self._gains[ANGULAR], k @ self._squares, side)
         linear, angular = np.clip(action, np.float32(-1.0), np.float32(1.0)).tolist()
         return linear, angular

@@ -267,8 +267,10 @@ class KernelRidge:
         if advice is not None:
             actions += unknown(k, self.fit.p)[:, None] * np.array([each.action for each in advice])
             turns = actions[:, ANGULAR]
-            to = np.array([each.to(turn, sides=sides) for each, turn in zip(advice, turns.tolist(), strict=True)])
-            actions[:, ANGULAR] = decided(turns, gain, k @ self.fit.squares, to)
+            side = np.array(
+                [each.side_for(turn, sides=sides) for each, turn in zip(advice, turns.tolist(), strict=True)]
+            )
+            actions[:, ANGULAR] = decided(turns, gain, k @ self.fit.squares, side)
         return [(clipped(linear), clipped(angular)) for linear, angular in actions.tolist()]
 
     @property

@@ -10,7 +10,7 @@ from nets import camera_net, fusion_net, kernel_net, lidar_net, noise
 
 from lira.fusion.inference.architecture import Architecture
 from lira.fusion.inference.build import alone, driving
-from lira.fusion.inference.trunks import PictureTrunk
+from lira.fusion.inference.trunks import PictureTrunk, ScanTrunk
 from lira.fusion.policies.ensemble import EnsembleNet
 from lira.fusion.policies.kernel import KernelRidge, KernelSettings
 from lira.fusion.policies.networks import ExpertNet, FusionNet, batch_of_one
@@ -98,6 +98,20 @@ def test_what_experts_and_novice_see_with_the_same_trunk_is_looked_at_once_a_ste
         for network in others:
             network.act(noise(101, k))
         assert len(looked) == k + 1
+
+
+def test_who_is_asked_with_half_of_its_view_need_not_look_at_the_whole_again(monkeypatch):
+    looked = []
+    look = ScanTrunk._look
+    monkeypatch.setattr(ScanTrunk, "_look", lambda self, seen: looked.append(1) or look(self, seen))
+    seen, lidar = noise(101), lidar_net(101, seed=4).driving()
+    novice = kernel_net(101, 16, seed=4, cruises=[(1.0, 0.0), lidar.act(seen)])  # the lidar's is quiet
+    del looked[:]
+    novice.act(seen)
+    halves = len(looked)
+    assert halves in (1, 2)  # it need not look at the second if the first says enough
+    assert lidar.act(seen)
+    assert len(looked) == halves
 
 
 def test_a_picture_that_changes_in_its_place_is_seen_anew():

@@ -216,7 +216,7 @@ def _loudest(graph: Graph, none: str, away: Sequence[str]) -> str:
 
 
 def _to(graph: Graph, action: str, side: str, hesitation: str) -> str:
-    """The side to turn to, as `Advice.to` has it."""
+    """The side to turn to, as `Advice.side_for` has it."""
     none, left = graph.constant("none", np.float32(0.0)), graph.constant("left", np.float32(1.0))
     right = graph.add("Less", [graph.column(action, ANGULAR), none])
     own = graph.add("Where", [right, graph.add("Neg", [left]), left])
