@@ -27,8 +27,11 @@ from loopback import take_own_loopback
 # The tests share the processors, and small matrices multiply no faster on several threads, which wait for each other.
 # As whoever teaches does it: sums depend on it.
 os.environ["OMP_NUM_THREADS"] = "1"
-# A shell that runs the suite in the background ignores SIGINT, and so would every process that a test starts.
+# A shell that runs the suite in the background ignores SIGINT, and nohup SIGHUP; so would every process that a test
+# starts. What is handled here is as ever there.
 signal.signal(signal.SIGINT, signal.default_int_handler)
+if signal.getsignal(signal.SIGHUP) is signal.SIG_IGN:
+    signal.signal(signal.SIGHUP, lambda *_: None)
 
 settings.register_profile("steady", derandomize=True)
 settings.register_profile("explore")

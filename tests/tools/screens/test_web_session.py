@@ -45,14 +45,18 @@ class Learner:
         return [received.message.request for received in self._asked.poll()]
 
     def is_asked(self, request, press):
-        """By a press, and by it once. A page that lags is not obeyed: who sees nothing happen presses again."""
-        found = []
-        for _ in range(PRESSES):
+        """By a press, and by it once. A page that lags is not obeyed: who sees nothing happen presses again.
+
+        Then the first press may be heard after all.
+        """
+        found, presses = [], 0
+        while not found and presses < PRESSES:
             press()
+            presses += 1
             with suppress(AssertionError):
                 found = wait_until(self.asked, timeout_s=NOTICED_S)
-                break
-        assert found == [request]
+        assert set(found) == {request}
+        assert len(found) <= presses
 
     def close(self):
         self._stop.set()
