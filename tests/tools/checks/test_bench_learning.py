@@ -1,7 +1,5 @@
 """The fields that `lira bench preprocess` and `lira bench train` promise. How fast they are is for the benchmarks."""
 
-import time
-
 import numpy as np
 import pytest
 from short_trials import write_world
@@ -51,19 +49,20 @@ def test_train_has_a_row_per_network_and_kind_of_training(monkeypatch):
 
 
 def test_train_is_put_beside_keras_where_that_is_installed(monkeypatch):
-    class Slow:
+    class Stands:  # in for Keras
         def __init__(self, filters, labels, updates, batch):
             self.known = (filters, len(labels), updates, batch)
 
         def train_step(self):
             assert self.known == (16, 20, 2, train.BATCH)
-            time.sleep(0.5)  # on any machine longer than two updates
 
     for name, value in {"RUNS": 1, "LABELS": 20, "UPDATES": 2, "TRAINING_STEPS": 1, "BINS": {16: 101}}.items():
         monkeypatch.setattr(train, name, value)
     monkeypatch.setattr(train.keras_reference, "installed", lambda: True)
-    monkeypatch.setattr(train.keras_reference, "KerasLearner", Slow)
-    assert all(row["keras_speedup"] > row["speedup"] for row in train.run())
+    monkeypatch.setattr(train.keras_reference, "KerasLearner", Stands)
+    rows = train.run()
+    assert rows
+    assert all(row["keras_speedup"] > 0.0 for row in rows)
 
 
 def test_log_writes_opens_and_learns_all_labels_and_says_what_memory_that_takes(monkeypatch):
