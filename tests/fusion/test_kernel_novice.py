@@ -211,9 +211,8 @@ def test_where_another_expert_hesitates_and_labels_are_undecided_it_turns_to_its
     assert learner.alone(box(0))[1] * own > 0.8
     frozen = learner.frozen()
     assert frozen.act(box(0)) == pytest.approx(learner.alone(box(0)), abs=1e-4)
-    before = KernelNet(
-        replace(frozen.architecture, halves=False), frozen.weights()
-    )  # as a file says that was proven so
+    # As a file says that was written, and proven, before.
+    before = KernelNet(replace(frozen.architecture, halves=False), frozen.weights())
     assert abs(before.act(box(0))[1]) < 0.3
 
 

@@ -162,7 +162,7 @@ def _kernel(graph: Graph, what: Architecture, weights: Weights, seen: Sequence[s
         first, side, hesitation = _advice(graph, what, weights, seen)
         turned = graph.add("Add", [turned, graph.add("Mul", [graph.cast(unknown), first])])
         squares = graph.add("MatMul", [values, graph.constant("squares", p @ weights["y"][:, ANGULAR:] ** 2)])
-        turned = _decided(graph, turned, weights["gain"], squares, _to(graph, turned, side, hesitation))
+        turned = _decided(graph, turned, weights["gain"], squares, _side_for(graph, turned, side, hesitation))
     limits = [graph.constant("low", np.float32(-1.0)), graph.constant("high", np.float32(1.0))]
     graph.add("Clip", [turned, *limits], "action")
     spread = graph.add("Sqrt", [unknown])
@@ -198,15 +198,14 @@ def _away(graph: Graph, what: Architecture, weights: Weights, feature: str, x: s
     return action, graph.add("Sub", [action, graph.constant(f"{trunk}_cruise", cruise)])
 
 
-def _halves(graph: Graph, what: Architecture, feature: str) -> tuple[str, ...]:
-    """What `Modality.halves` makes of a feature."""
-    nothing, width = MODALITIES[feature].free, what.shapes[feature][-1]
-    if nothing is None:
-        return ()
-    free, place = graph.constant(f"{feature}_free", np.float32(nothing)), np.arange(width)
-    first = graph.constant(f"{feature}_first", place < width // 2)
-    last = graph.constant(f"{feature}_last", place >= width - width // 2)
-    return graph.add("Where", [first, free, feature]), graph.add("Where", [last, free, feature])
+def _halves(graph: Graph, what: Architecture, feature: str) -> list[str]:
+    """What `Modality.halves` makes of a feature: where it frees what is zero, it frees whatever is there."""
+    freed = MODALITIES[feature].halves(np.zeros(what.shapes[feature][-1], np.float32))
+    halves = []
+    for k, values in enumerate(freed):
+        where = graph.constant(f"{feature}_half.{k}", values > 0.0)
+        halves.append(graph.add("Where", [where, graph.constant(f"{feature}_free.{k}", values), feature]))
+    return halves
 
 
 def _loudest(graph: Graph, none: str, away: Sequence[str]) -> str:
@@ -215,7 +214,7 @@ def _loudest(graph: Graph, none: str, away: Sequence[str]) -> str:
     return graph.add("Max", [none, *most])
 
 
-def _to(graph: Graph, action: str, side: str, hesitation: str) -> str:
+def _side_for(graph: Graph, action: str, side: str, hesitation: str) -> str:
     """The side to turn to, as `Advice.side_for` has it."""
     none, left = graph.constant("none", np.float32(0.0)), graph.constant("left", np.float32(1.0))
     right = graph.add("Less", [graph.column(action, ANGULAR), none])

@@ -1,5 +1,7 @@
 """The fields that `lira bench preprocess` and `lira bench train` promise. How fast they are is for the benchmarks."""
 
+import time
+
 import numpy as np
 import pytest
 from short_trials import write_world
@@ -55,6 +57,7 @@ def test_train_is_put_beside_keras_where_that_is_installed(monkeypatch):
 
         def train_step(self):
             assert self.known == (16, 20, 2, train.BATCH)
+            time.sleep(0.5)
 
     for name, value in {"RUNS": 1, "LABELS": 20, "UPDATES": 2, "TRAINING_STEPS": 1, "BINS": {16: 101}}.items():
         monkeypatch.setattr(train, name, value)
@@ -62,7 +65,7 @@ def test_train_is_put_beside_keras_where_that_is_installed(monkeypatch):
     monkeypatch.setattr(train.keras_reference, "KerasLearner", Stands)
     rows = train.run()
     assert rows
-    assert all(row["keras_speedup"] > 0.0 for row in rows)
+    assert all(row["keras_speedup"] * row["step_s"] > 0.499 for row in rows)  # Keras's seconds, on any machine
 
 
 def test_log_writes_opens_and_learns_all_labels_and_says_what_memory_that_takes(monkeypatch):

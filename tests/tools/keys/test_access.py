@@ -4,7 +4,7 @@ import time
 
 import pytest
 import zenoh
-from keyed_bed import GO, NAME, attacker, drive_until, make_keys, plain_session, replies, serving, tls
+from keyed_bed import GO, NAME, attacker, drive_until, make_keys, plain_session, replies, tls
 from zenoh import ext
 
 from lira.hal.bus.attachment import Attachment, parse_attachment
@@ -22,12 +22,6 @@ from lira.tools.launch.processes import free_port
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory):
     return make_keys(tmp_path_factory.mktemp("keys") / "keys")
-
-
-@pytest.fixture
-def robot(folder):
-    with serving(folder) as served:
-        yield served
 
 
 @pytest.mark.parametrize("who", ["guest", "anna"])

@@ -5,7 +5,7 @@ import threading
 import time
 
 import pytest
-from keyed_bed import GO, NAME, drive_until, make_keys, plain_session, serving, wait_for
+from keyed_bed import GO, NAME, drive_until, make_keys, plain_session, wait_for
 
 from lira.hal.bus.bus import Bus
 from lira.hal.bus.keys import KEY, ROLES, load_keys
@@ -25,12 +25,6 @@ def folder(tmp_path_factory):
     folder = make_keys(tmp_path_factory.mktemp("keys") / "keys")
     init(folder.parent / "others")
     return folder
-
-
-@pytest.fixture
-def robot(folder):
-    with serving(folder) as served:
-        yield served
 
 
 @pytest.mark.parametrize("who", ["laptop", "anna"])

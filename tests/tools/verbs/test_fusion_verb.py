@@ -1,7 +1,6 @@
 """What `lira fusion` and `lira drive` say to bad input: one line and the remedy, exit status 2, and nothing lost."""
 
 import json
-import signal
 import threading
 import uuid
 from functools import partial
@@ -42,14 +41,6 @@ def address():
     stop.set()
     thread.join(10.0)
     assert bus.close()
-
-
-@pytest.fixture(autouse=True)
-def _as_it_was():
-    """The verb sets it for its whole process, and here that is ours."""
-    handler = signal.getsignal(signal.SIGTERM)
-    yield
-    signal.signal(signal.SIGTERM, handler)
 
 
 @pytest.fixture

@@ -2,7 +2,6 @@
 
 import json
 import math
-import signal
 import threading
 import uuid
 from contextlib import contextmanager
@@ -32,13 +31,6 @@ pytestmark = pytest.mark.slow
 
 PROFILE = load_profile("rosbot2")
 WALLS = (3.0, -1.5, 2.0, -1.2)  # of a room, seen from the robot: ahead, behind, left, right
-
-
-@pytest.fixture(autouse=True)
-def _keep_signals():
-    before = signal.getsignal(signal.SIGTERM)
-    yield
-    signal.signal(signal.SIGTERM, before)
 
 
 def room(bearing):

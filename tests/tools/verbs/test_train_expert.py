@@ -1,7 +1,5 @@
 """`lira train-expert` on a curriculum that takes seconds: the shipped experts show that the real ones are passed."""
 
-import signal
-
 import pytest
 
 from lira.fusion.inference.checkpoint import load_checkpoint
@@ -9,13 +7,6 @@ from lira.fusion.teaching.curriculum import CURRICULA, STRICT, Curriculum
 from lira.fusion.teaching.ride import Drive
 from lira.hal.messages import Episode
 from lira.tools import cli
-
-
-@pytest.fixture(autouse=True)
-def _as_it_was():
-    handler = signal.getsignal(signal.SIGTERM)
-    yield
-    signal.signal(signal.SIGTERM, handler)
 
 
 @pytest.fixture
