@@ -15,7 +15,7 @@ from lira.hal.bus.topics import (
     Topic,
 )
 from lira.hal.description.frames import mounts_of
-from lira.hal.messages.codec import ros_type_of
+from lira.hal.messages.ros.codec import ros_type_of
 from lira.hal.profile import load_profile
 from lira.hal.rmw.hashes import type_hash
 from lira.hal.rmw.services import TRIGGER

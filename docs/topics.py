@@ -3,8 +3,8 @@
 from zenoh import Reliability
 
 from lira.hal.bus.topics import TOPICS, Qos, Topic
-from lira.hal.messages.codec import ros_type_of
-from lira.hal.messages.ros_types import PACKAGE, TYPES
+from lira.hal.messages.ros.codec import ros_type_of
+from lira.hal.messages.ros.types import PACKAGE, TYPES
 from lira.hal.rmw.hashes import type_hash
 
 

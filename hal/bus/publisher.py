@@ -10,7 +10,7 @@ from lira.hal.bus.connection import Connection
 from lira.hal.bus.topics import Qos, Topic
 from lira.hal.clock import OWN_TIME, TimeBase
 from lira.hal.errors import BusError
-from lira.hal.messages.codec import encode
+from lira.hal.messages.ros.codec import encode
 
 M = TypeVar("M")
 

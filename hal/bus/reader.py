@@ -15,7 +15,7 @@ from lira.hal.bus.connection import Connection, Declared
 from lira.hal.bus.publisher import shifted
 from lira.hal.bus.topics import ATTACHMENT_BYTES, BY, LATCHED_KEYS, MESSAGE_BYTES, TOPICS, Topic
 from lira.hal.clock import OWN_TIME, TimeBase
-from lira.hal.messages.codec import decode
+from lira.hal.messages.ros.codec import decode
 
 M = TypeVar("M")
 

@@ -12,7 +12,7 @@ from lira.hal.bus.bus import Bus
 from lira.hal.bus.topics import ESTOP_LOOK, ESTOP_PRESS, ESTOP_RELEASE, INFO
 from lira.hal.errors import BusError, CodecError
 from lira.hal.messages.bounds import LARGEST
-from lira.hal.messages.codec import decode_json
+from lira.hal.messages.ros.codec import decode_json
 from lira.hal.profile import RobotProfile
 
 REALTIME: Literal["realtime"] = "realtime"

@@ -34,7 +34,7 @@ from lira.hal.messages import (
     Twist,
     TwistStamped,
 )
-from lira.hal.messages.codec import fixed_bytes, ros_type_of
+from lira.hal.messages.ros.codec import fixed_bytes, ros_type_of
 
 M = TypeVar("M")
 

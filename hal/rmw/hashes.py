@@ -6,7 +6,7 @@ from typing import Any
 from rosbags.interfaces import Nodetype
 from rosbags.typesys.store import Typestore
 
-from lira.hal.messages.ros_types import types_with
+from lira.hal.messages.ros.types import types_with
 
 
 @cache

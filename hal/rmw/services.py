@@ -9,7 +9,7 @@ from typing import Any
 
 from rosbags.interfaces import Nodetype
 
-from lira.hal.messages.ros_types import TYPES
+from lira.hal.messages.ros.types import TYPES
 
 TRIGGER = "std_srvs/srv/Trigger"
 _REQUEST, _RESPONSE, _EVENT = (f"{TRIGGER}_{part}" for part in ("Request", "Response", "Event"))

@@ -10,7 +10,7 @@ from lira.hal.bus.services import Info
 from lira.hal.bus.topics import INFO, RESET
 from lira.hal.errors import CodecError, LiraError
 from lira.hal.messages import Episode
-from lira.hal.messages.codec import decode_json
+from lira.hal.messages.ros.codec import decode_json
 from lira.hal.port import Arena
 
 RESETS = 1  # at a time

@@ -11,8 +11,8 @@ from rosbags.typesys.store import Typestore
 
 from lira.hal.errors import SensorError
 from lira.hal.messages import BatteryState, Imu, Range, Twist
-from lira.hal.messages.msg_text import read_all
-from lira.hal.messages.ros_types import yaw_from
+from lira.hal.messages.ros.msg_text import read_all
+from lira.hal.messages.ros.types import yaw_from
 from lira.robot.core2.wheels import Pose
 
 # Before Noetic the battery's message had no temperatures.

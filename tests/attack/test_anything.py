@@ -18,7 +18,7 @@ from lira.hal.bus.services import ask_info, look_at_estop, release_estop
 from lira.hal.bus.topics import CMD_VEL, ESTOP_LOOK, ESTOP_PRESS, ESTOP_RELEASE, INFO, RESET, TOPICS
 from lira.hal.client.connect import open_remote
 from lira.hal.messages import STOP, Applied, Bool, Clock, Command, LaserScan, Odometry, Twist
-from lira.hal.messages.codec import encode
+from lira.hal.messages.ros.codec import encode
 
 EXAMPLES = 15
 MORE_MB = 80

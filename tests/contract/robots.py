@@ -21,7 +21,7 @@ from lira.hal.bus.topics import CMD_VEL, SIM_STATE
 from lira.hal.client.connect import open_remote
 from lira.hal.client.remote import RemoteArena
 from lira.hal.messages import Command, CourseState, Episode
-from lira.hal.messages.codec import encode
+from lira.hal.messages.ros.codec import encode
 from lira.hal.port import Arena, Robot
 from lira.hal.profile import Depth, load_profile
 from lira.hal.safety.governed import GovernedRobot

@@ -9,7 +9,7 @@ import pytest
 from lira.hal.bus.bus import Bus
 from lira.hal.bus.topics import APPLIED, OPERATOR, SIM_STATE
 from lira.hal.messages import HELD, STOP, OperatorRequest, Reason, Request
-from lira.hal.messages.codec import encode
+from lira.hal.messages.ros.codec import encode
 from lira.hal.profile import STOP_BUDGET_S
 from lira.tools.launch.processes import ChildProcess, free_port, lira_command
 

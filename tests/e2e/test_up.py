@@ -15,7 +15,7 @@ import pytest
 from lira.hal.bus.bus import Bus
 from lira.hal.bus.topics import APPLIED, OPERATOR
 from lira.hal.messages import STOP, OperatorRequest, Request
-from lira.hal.messages.codec import encode
+from lira.hal.messages.ros.codec import encode
 from lira.tools.cli import main
 from lira.tools.launch.processes import ChildProcess, free_port, lira_command
 

@@ -13,7 +13,7 @@ from lira.fusion.log.label_log import DemonstrationLog
 from lira.hal.bus.reader import RawSample
 from lira.hal.bus.services import Info
 from lira.hal.bus.topics import TOPICS
-from lira.hal.messages.codec import encode
+from lira.hal.messages.ros.codec import encode
 from lira.tools.cli import main
 from lira.tools.export.run import labels_beside, load_run
 from lira.tools.recording.layout import FOLDER, Head

@@ -28,9 +28,9 @@ from lira.hal.messages import (
     Twist,
     TwistStamped,
 )
-from lira.hal.messages.codec import CODECS, encode, ros_type_of
 from lira.hal.messages.compression import compress_depth
-from lira.hal.messages.ros_types import TYPES
+from lira.hal.messages.ros.codec import CODECS, encode, ros_type_of
+from lira.hal.messages.ros.types import TYPES
 from lira.hal.profile import load_profile
 from lira.tools.cli import main
 from lira.tools.export.bag_reader import choose, read_bag

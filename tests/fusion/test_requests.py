@@ -17,7 +17,7 @@ from lira.hal.bus.bus import Bus
 from lira.hal.bus.topics import OPERATOR, OPERATOR_ANSWER
 from lira.hal.errors import BusError, StorageError
 from lira.hal.messages import STOP, OperatorRequest, Reason, Request, Twist
-from lira.hal.messages.codec import encode
+from lira.hal.messages.ros.codec import encode
 from lira.hal.profile import load_profile
 from lira.hal.testing import NullRobot
 from lira.tools.launch.processes import free_port

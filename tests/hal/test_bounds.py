@@ -25,7 +25,7 @@ from lira.hal.messages import (
     Twist,
 )
 from lira.hal.messages.bounds import LARGEST, LONGEST_TEXT, MOST_BEAMS, MOST_ITEMS
-from lira.hal.messages.codec import decode, decode_json, encode
+from lira.hal.messages.ros.codec import decode, decode_json, encode
 
 NAN, INF = math.nan, math.inf
 LAP = CourseState(1.0, 0.0, 0.0, 0.0, 0.0, 0.0, NAN, NAN, INF)

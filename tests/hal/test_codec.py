@@ -24,9 +24,9 @@ from lira.hal.messages import (
     Twist,
     TwistStamped,
 )
-from lira.hal.messages.codec import CODECS, decode, encode, ros_type_of
 from lira.hal.messages.compression import compress
-from lira.hal.messages.ros_types import TYPES, definition
+from lira.hal.messages.ros.codec import CODECS, decode, encode, ros_type_of
+from lira.hal.messages.ros.types import TYPES, definition
 from lira.tools.bench.parts.samples import DECISION, INF, MESSAGES, NAN, of_kind
 
 SCAN = of_kind(LaserScan)[0]

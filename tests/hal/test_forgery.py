@@ -18,7 +18,7 @@ from lira.hal.bus.reader import Received
 from lira.hal.bus.services import look_at_estop, press_estop
 from lira.hal.bus.topics import APPLIED, CMD_VEL, ESTOP_LOOK, ESTOP_PRESS, INFO, SCAN, TELEOP, named
 from lira.hal.messages import STOP, Applied, Command, LaserScan, Reason, Source, Twist
-from lira.hal.messages.codec import encode
+from lira.hal.messages.ros.codec import encode
 
 GO, BACK = Twist(0.5, 0.0), Twist(-0.2, 0.0)
 FORGED_M = 77.0

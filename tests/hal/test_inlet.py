@@ -15,7 +15,7 @@ from lira.hal.bus.reader import Reader
 from lira.hal.bus.topics import CMD_VEL, ESTOP, INFO, JOY
 from lira.hal.errors import BusError
 from lira.hal.messages import STOP, Bool, Command, Joy, Reason, Twist
-from lira.hal.messages.codec import encode
+from lira.hal.messages.ros.codec import encode
 from lira.hal.server.command_reader import BURST, DEPTH, ESTOP_DEPTH, Inlet, Order
 
 GO = Twist(0.5, 0.0)

@@ -6,8 +6,8 @@ import pytest
 from fresh import python
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
-from lira.hal.messages.msg_text import read, read_all
-from lira.hal.messages.ros_types import TYPES, all_types, definition, types_with
+from lira.hal.messages.ros.msg_text import read, read_all
+from lira.hal.messages.ros.types import TYPES, all_types, definition, types_with
 
 MESSAGES = resources.files("lira.hal.messages")
 OURS = {entry.name: entry.read_text() for entry in (MESSAGES / "msg").iterdir() if entry.name.endswith(".msg")}

@@ -15,7 +15,7 @@ from trigger import read_answer
 
 from lira.hal.bus.topics import TOPICS
 from lira.hal.errors import ConfigError
-from lira.hal.messages.ros_types import all_types
+from lira.hal.messages.ros.types import all_types
 from lira.hal.rmw.attachment import RmwAttachment, gid_of, parse_rmw_attachment
 from lira.hal.rmw.hashes import type_hash
 from lira.hal.rmw.names import RmwKey, check_namespace, dds_type, full_name, is_name, parse_key, ros_type

@@ -10,7 +10,7 @@ from wiring import joined, new_endpoint, new_name, real_time_null, served, wait_
 from lira.hal.bus.bus import Bus
 from lira.hal.bus.topics import APPLIED, CMD_VEL, DIAGNOSTICS
 from lira.hal.messages import STOP, Reason, Twist, TwistStamped
-from lira.hal.messages.codec import encode
+from lira.hal.messages.ros.codec import encode
 from lira.hal.server.command_watch import CommandWatch, Noted
 from lira.hal.server.diagnostics import OK, WARN
 

@@ -22,9 +22,9 @@ from lira.hal.description.frames import odometry_transform, static_transforms
 from lira.hal.description.urdf import urdf_of
 from lira.hal.errors import ConfigError
 from lira.hal.messages import DepthImage, Image, Imu, Odometry, Spread
-from lira.hal.messages.codec import CODECS, decode, encode
 from lira.hal.messages.compression import compress, compress_depth
 from lira.hal.messages.images import size_of
+from lira.hal.messages.ros.codec import CODECS, decode, encode
 from lira.hal.profile import known_profiles, load_profile
 from lira.hal.server.graph_publisher import GraphPublisher
 from lira.hal.testing import NullRobot

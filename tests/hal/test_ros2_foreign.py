@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from foreign import run_foxglove, run_ros
 
-from lira.hal.messages.codec import decode, encode, ros_type_of
-from lira.hal.messages.ros_types import PACKAGE, TYPES, definition
+from lira.hal.messages.ros.codec import decode, encode, ros_type_of
+from lira.hal.messages.ros.types import PACKAGE, TYPES, definition
 from lira.hal.rmw.hashes import type_hash
 from lira.tools.bench.parts.samples import MESSAGES
 from lira.tools.ros2.package import package_files

@@ -16,8 +16,8 @@ from zenoh import ext
 from lira.hal.bus.topics import APPLIED, CAMERA, COMMANDS, FROM_OPERATORS, SCAN
 from lira.hal.errors import ConfigError
 from lira.hal.messages import STOP, Reason, Source, Twist
-from lira.hal.messages.codec import encode
 from lira.hal.messages.motion import TwistStamped
+from lira.hal.messages.ros.codec import encode
 from lira.hal.rmw.attachment import RmwAttachment
 from lira.hal.rmw.hashes import type_hash
 from lira.hal.rmw.names import RmwKey

@@ -16,8 +16,8 @@ from lira.hal.client.realtime import DECISION_S
 from lira.hal.client.remote import RemoteArena
 from lira.hal.errors import BusError, DeviceError
 from lira.hal.messages import STOP, Applied, Command, Episode, Reason, Source, Twist
-from lira.hal.messages.codec import encode
 from lira.hal.messages.compression import read_depth
+from lira.hal.messages.ros.codec import encode
 from lira.hal.profile import STOP_BUDGET_S, Depth
 from lira.hal.safety.governed import GovernedRobot
 from lira.hal.server.realtime import SWITCH_S

@@ -59,6 +59,6 @@ def test_the_way_of_a_scan_to_the_command_is_short():
         way = {name: set(ran[name]) for name in (driver, *ON_THE_WAY)}
     files = {Path(name).resolve() for name in set().union(*way.values())}
     ours = sorted(str(path.relative_to(PRODUCT)) for path in files if any(map(path.is_relative_to, FOLDERS)))
-    for needed in ("hal/testing.py", "hal/messages/ros_sensing.py", "hal/client/realtime.py", "hal/safety/governor.py"):
+    for needed in ("hal/testing.py", "hal/messages/ros/sensing.py", "hal/client/realtime.py", "hal/safety/governor.py"):
         assert needed in ours  # else nothing was followed
     assert len(ours) <= MOST_FILES, f"{len(ours)} files: {', '.join(ours)}"

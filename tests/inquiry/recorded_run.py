@@ -4,7 +4,7 @@ from lira.hal.bus.attachment import Attachment
 from lira.hal.bus.reader import RawSample
 from lira.hal.bus.services import LOCKSTEP, Info
 from lira.hal.bus.topics import APPLIED, CAMERA, DECISION, METHOD, SCAN
-from lira.hal.messages.codec import encode
+from lira.hal.messages.ros.codec import encode
 from lira.tools.recording.layout import Head
 from lira.tools.recording.timeline import TimeLine
 from lira.tools.recording.writer import RecordingWriter

@@ -10,7 +10,7 @@ from lira.hal.bus.reader import RawSample
 from lira.hal.bus.services import Info
 from lira.hal.bus.topics import BATTERY, CAMERA, ODOM, SCAN
 from lira.hal.messages import BatteryState, CompressedImage, LaserScan, Odometry
-from lira.hal.messages.codec import encode
+from lira.hal.messages.ros.codec import encode
 from lira.hal.profile import load_profile
 from lira.tools.recording.layout import Head
 from lira.tools.recording.writer import RecordingWriter

@@ -12,7 +12,7 @@ from samples import BEGAN_NS, EPOCH, HEAD, OFFSET_NS, battery, drive, odom, pict
 from lira.hal.bus.topics import BATTERY, CAMERA, DESCRIPTION, ODOM, SCAN
 from lira.hal.errors import StorageError
 from lira.hal.messages import Odometry, Text
-from lira.hal.messages.ros_types import TYPES
+from lira.hal.messages.ros.types import TYPES
 from lira.tools.cli import main
 from lira.tools.recording.layout import FOLDER
 from lira.tools.recording.reader import Recording

@@ -16,7 +16,7 @@ from ros2_rig import GO, PROFILE, drive_until, get_going, served, wait_for
 from lira.hal.bus.bus import Bus
 from lira.hal.errors import BusError, ConfigError, DeviceError
 from lira.hal.messages import STOP, Command, CompressedImage, LaserScan, Reason
-from lira.hal.messages.ros_types import definition
+from lira.hal.messages.ros.types import definition
 from lira.robot.ros2.forms import placed_scan, plain_picture
 from lira.robot.ros2.robot import Interface, Ros2Robot
 from lira.tools.cli import main

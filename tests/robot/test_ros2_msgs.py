@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 from foreign import ros_share, run_ros
 
-from lira.hal.messages.ros_types import PACKAGE, TYPES
+from lira.hal.messages.ros.types import PACKAGE, TYPES
 from lira.hal.rmw.hashes import type_hash
 from lira.tools.cli import main
 from lira.tools.ros2.package import definitions, package_files

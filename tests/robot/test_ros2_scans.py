@@ -11,8 +11,8 @@ from mcap.records import Schema
 from mcap_ros2.decoder import DecoderFactory
 from test_rplidar_turn import LIDAR, cut, spin
 
-from lira.hal.messages.codec import encode, ros_type_of
-from lira.hal.messages.ros_types import definition
+from lira.hal.messages.ros.codec import encode, ros_type_of
+from lira.hal.messages.ros.types import definition
 from lira.hal.profile import known_profiles, load_profile
 from lira.robot.rplidar.turn import scan_of
 from lira.sim_backend.twin import Twin

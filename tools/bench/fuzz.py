@@ -18,8 +18,8 @@ from lira.hal.bus.attachment import Attachment, parse_attachment
 from lira.hal.bus.services import REALTIME, EstopState, Info, info_from_json, reset_time
 from lira.hal.errors import LiraError
 from lira.hal.messages import CompressedImage, Episode, Image
-from lira.hal.messages.codec import CODECS, decode, encode
 from lira.hal.messages.compression import compress
+from lira.hal.messages.ros.codec import CODECS, decode, encode
 from lira.hal.profile import load_profile, profile_from_json
 from lira.sim_backend.catalogue import load_world
 from lira.sim_backend.world import World

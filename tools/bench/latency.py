@@ -16,7 +16,7 @@ from lira.hal.bus.attachment import Attachment
 from lira.hal.client.connect import connect
 from lira.hal.errors import BusError
 from lira.hal.messages import STOP, LaserScan
-from lira.hal.messages.codec import encode
+from lira.hal.messages.ros.codec import encode
 from lira.tools.bench import Row
 from lira.tools.bench.parts import echo
 from lira.tools.bench.parts.answers import Answers

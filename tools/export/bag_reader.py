@@ -18,8 +18,8 @@ from lira.hal.bus.sensors import Stamped, observation_of
 from lira.hal.errors import ConfigError, SensorError, StorageError
 from lira.hal.messages import Applied, CompressedImage, Image, LaserScan, Source, Twist, TwistStamped
 from lira.hal.messages.bounds import check
-from lira.hal.messages.codec import CODECS, ros_type_of
-from lira.hal.messages.ros_types import all_types
+from lira.hal.messages.ros.codec import CODECS, ros_type_of
+from lira.hal.messages.ros.types import all_types
 from lira.hal.profile import RobotProfile
 from lira.tools.export.demonstrations import Shown
 

@@ -7,7 +7,7 @@ from typing import Any
 
 import msgspec
 
-from lira.hal.messages.ros_types import types_with
+from lira.hal.messages.ros.types import types_with
 from lira.tools.recording.layout import BAG, ENCODING, Head
 
 VERSION = 9

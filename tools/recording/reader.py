@@ -25,8 +25,8 @@ from zstandard import ZstdError
 from lira.hal.bus.attachment import Attachment, parse_attachment
 from lira.hal.bus.topics import BY, TOPICS, Topic, named
 from lira.hal.errors import CodecError, StorageError
-from lira.hal.messages.codec import decode
-from lira.hal.messages.ros_types import types_with
+from lira.hal.messages.ros.codec import decode
+from lira.hal.messages.ros.types import types_with
 from lira.tools.recording.layout import ATTACHMENT_KEY, HEAD, INFO, LOSSES, Head, files_of, head_from
 from lira.tools.recording.writer import attachment_from_cdr
 

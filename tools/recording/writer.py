@@ -12,7 +12,7 @@ from mcap.writer import CompressionType, Writer
 from lira.hal.bus.reader import RawSample
 from lira.hal.bus.topics import LATCHED_KEYS
 from lira.hal.errors import StorageError
-from lira.hal.messages.ros_types import definition
+from lira.hal.messages.ros.types import definition
 from lira.tools.recording.bag import BagFile, qos_text, write_bag
 from lira.tools.recording.layout import (
     ATTACHMENT_KEY,

@@ -4,7 +4,7 @@ import re
 from collections.abc import Mapping
 from importlib import resources
 
-from lira.hal.messages.ros_types import PACKAGE
+from lira.hal.messages.ros.types import PACKAGE
 
 _OTHERS = re.compile(r"^([a-z][a-z0-9_]*)/[A-Z]\w*(?:\[[^\]]*\])?\s", re.MULTILINE)
 _MANIFEST = """\

@@ -9,7 +9,7 @@ from lira.hal.bus.sensors import SENSORS
 from lira.hal.bus.topics import ESTOP_PRESS, Topic
 from lira.hal.errors import CodecError
 from lira.hal.messages import Twist, TwistStamped
-from lira.hal.messages.codec import decode, ros_type_of
+from lira.hal.messages.ros.codec import decode, ros_type_of
 from lira.hal.rmw.tokens import Kind
 from lira.hal.ros_graph.look import OURS, Heard, Sight
 

@@ -7,7 +7,7 @@ import signal
 from dataclasses import dataclass, field
 
 from lira.hal.messages import Bool
-from lira.hal.messages.codec import encode
+from lira.hal.messages.ros.codec import encode
 from lira.tools.stop_test import acts
 from lira.tools.stop_test.acts import (
     HOUR_S,

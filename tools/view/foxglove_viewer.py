@@ -13,7 +13,7 @@ from foxglove.websocket import ChannelView, Client, ServerListener
 
 from lira.hal.bus.topics import Topic
 from lira.hal.errors import ConfigError
-from lira.hal.messages.ros_types import definition
+from lira.hal.messages.ros.types import definition
 from lira.tools.view.source import Sample
 
 BACKLOG = 256  # messages that wait for one client; then the oldest go

@@ -5,7 +5,7 @@ import random
 import pytest
 
 from lira.hal.messages import Source
-from lira.hal.messages.codec import CODECS
+from lira.hal.messages.ros.codec import CODECS
 from lira.tools.bench import BENCHES, fuzz
 from lira.tools.bench.soak import Watched, Work, growth, rise
 from lira.tools.cli import main

@@ -15,7 +15,7 @@ from lira.hal.bus.topics import BATTERY, ESTOP_LOOK, ESTOP_PRESS, ESTOP_RELEASE,
 from lira.hal.client.connect import open_remote
 from lira.hal.errors import BusError, ConfigError
 from lira.hal.messages import STOP, BatteryState, Command, Reason, Twist
-from lira.hal.messages.codec import encode
+from lira.hal.messages.ros.codec import encode
 from lira.tools.launch.processes import free_port
 
 

@@ -14,7 +14,7 @@ from lira.hal.bus.topics import APPLIED, CMD_VEL, DIAGNOSTICS, JOY, OPERATOR, SI
 from lira.hal.client.connect import open_remote
 from lira.hal.errors import BusError, ConfigError
 from lira.hal.messages import STOP, Joy, OperatorRequest, Reason, Request
-from lira.hal.messages.codec import encode
+from lira.hal.messages.ros.codec import encode
 from lira.tools.authority import init
 from lira.tools.cli import main
 from lira.tools.launch.processes import ChildProcess, free_port, lira_command

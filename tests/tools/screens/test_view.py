@@ -21,7 +21,7 @@ from lira.hal.bus.reader import RawSample
 from lira.hal.bus.services import Info
 from lira.hal.bus.topics import APPLIED, BATTERY, CAMERA, ODOM, PICTURE, SCAN, TF, TOPICS
 from lira.hal.messages import BatteryState, CompressedImage, Odometry, Reason
-from lira.hal.messages.codec import encode
+from lira.hal.messages.ros.codec import encode
 from lira.hal.profile import load_profile
 from lira.tools.cli import main
 from lira.tools.launch.processes import ChildProcess, free_port, lira_command

@@ -8,7 +8,7 @@ from foxglove import layouts
 
 from lira.hal.bus.topics import TOPICS
 from lira.hal.messages import Reason
-from lira.hal.messages.ros_types import TYPES
+from lira.hal.messages.ros.types import TYPES
 from lira.tools.cli import main
 from lira.tools.view.layout import layout_text
 

@@ -21,7 +21,7 @@ from lira.hal.bus.services import look_at_estop, release_estop
 from lira.hal.bus.topics import APPLIED, CMD_VEL, TELEOP, Topic, named
 from lira.hal.errors import BusError
 from lira.hal.messages import STOP, Applied, Twist
-from lira.hal.messages.codec import encode
+from lira.hal.messages.ros.codec import encode
 from lira.tools.stop_test.parts import flood
 from lira.tools.stop_test.parts.sender import Pen
 

@@ -18,8 +18,8 @@ import zenoh
 
 from lira.hal.bus.topics import CAMERA, CMD_VEL, ODOM, SCAN
 from lira.hal.messages import STOP, Image, LaserScan, Odometry, Twist
-from lira.hal.messages.codec import decode, encode
 from lira.hal.messages.compression import compress
+from lira.hal.messages.ros.codec import decode, encode
 from lira.hal.profile import RobotProfile, load_profile
 from lira.hal.signals import stop_on_signal
 from lira.hal.testing import small_pictures

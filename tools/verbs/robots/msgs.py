@@ -23,7 +23,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Write it."""
     from lira.hal.config import write_whole
-    from lira.hal.messages.ros_types import PACKAGE
+    from lira.hal.messages.ros.types import PACKAGE
     from lira.tools.cli import version
     from lira.tools.ros2.package import package_files
 

@@ -10,13 +10,9 @@ import msgspec
 from rosbags.serde import SerdeError
 
 from lira.hal.errors import CodecError
-from lira.hal.messages import ros_description as description
-from lira.hal.messages import ros_learning as learning
-from lira.hal.messages import ros_motion as motion
-from lira.hal.messages import ros_operation as operation
-from lira.hal.messages import ros_sensing as sensing
 from lira.hal.messages.bounds import check
-from lira.hal.messages.ros_types import TYPES, Codec
+from lira.hal.messages.ros import description, learning, motion, operation, sensing
+from lira.hal.messages.ros.types import TYPES, Codec
 
 M = TypeVar("M")
 PADDED_BYTES = 16

@@ -15,7 +15,7 @@ from lira.hal.messages import (
     OperatorRequest,
     Request,
 )
-from lira.hal.messages.ros_types import Codec, header, ros, seconds, stamp, time_to
+from lira.hal.messages.ros.types import Codec, header, ros, seconds, stamp, time_to
 
 
 def _clock_to(m: Clock) -> Any:

@@ -8,7 +8,7 @@ import numpy as np
 from lira.hal.messages import BatteryState, CompressedImage, Image, LaserScan, Range
 from lira.hal.messages.description import BASE, LASER, OPTICAL
 from lira.hal.messages.images import objection, picture_format, transport_format
-from lira.hal.messages.ros_types import Codec, header, ros, stamp
+from lira.hal.messages.ros.types import Codec, header, ros, stamp
 
 CHANNELS = {"rgb8": 3, "bgr8": 3, "rgba8": 4, "mono8": 1}
 

@@ -1,7 +1,7 @@
-"""The types: those of ROS 2 that we speak (`jazzy.msg`), our own in `msg/` (package `lira_msgs`), and what most share.
+"""The types: those of ROS 2 that we speak (`jazzy.msg`), our own (`msg/`, package `lira_msgs`), and what most share.
 
-All of ROS 2 Jazzy's, which others may send, are loaded when somebody asks for one: that takes as long as the rest of a
-start.
+The files of both lie beside the values. All of ROS 2 Jazzy's, which others may send, are loaded when somebody asks for
+one: that takes as long as the rest of a start.
 """
 
 import math
@@ -15,7 +15,7 @@ from rosbags.typesys import Stores, get_typestore
 from rosbags.typesys.store import Typestore
 
 from lira.hal.messages import Twist
-from lira.hal.messages.msg_text import Definitions, read, read_all
+from lira.hal.messages.ros.msg_text import Definitions, read, read_all
 
 PACKAGE = "lira_msgs"
 

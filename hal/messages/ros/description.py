@@ -6,7 +6,7 @@ import numpy as np
 
 from lira.hal.messages import CameraInfo, Text, Transform, Transforms
 from lira.hal.messages.description import OPTICAL
-from lira.hal.messages.ros_types import Codec, Vector3, header, ros, stamp, time_to
+from lira.hal.messages.ros.types import Codec, Vector3, header, ros, stamp, time_to
 
 _Header = ros("std_msgs/msg/Header")
 _Quaternion = ros("geometry_msgs/msg/Quaternion")

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from lira.hal.messages import Applied, Imu, Odometry, Reason, Source, Twist, TwistStamped
 from lira.hal.messages.description import BASE, IMU_LINK, ODOM_FRAME
-from lira.hal.messages.ros_types import Codec, Vector3, header, ros, stamp, twist_from, twist_to, yaw_from, yaw_to
+from lira.hal.messages.ros.types import Codec, Vector3, header, ros, stamp, twist_from, twist_to, yaw_from, yaw_to
 
 _Point = ros("geometry_msgs/msg/Point")
 _Pose = ros("geometry_msgs/msg/Pose")

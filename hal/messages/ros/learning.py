@@ -20,7 +20,7 @@ from lira.hal.messages import (
     SessionState,
     Stage,
 )
-from lira.hal.messages.ros_types import Codec, header, ros, stamp
+from lira.hal.messages.ros.types import Codec, header, ros, stamp
 
 _COURSE_FIELDS = tuple(CourseState.__dataclass_fields__)[1:]
 _COUNT_FIELDS = tuple(LabelCounts.__dataclass_fields__)
