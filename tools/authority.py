@@ -23,8 +23,8 @@ from cryptography.hazmat.primitives.serialization import (
 )
 from cryptography.x509.oid import ExtendedKeyUsageOID, NameOID
 
-from lira.hal.bus.expiry import SOON_DAYS
-from lira.hal.bus.keys import CA, CERTIFICATE, KEY, KEY_MODE, NAME, NAMES, ROLES, Role, load_roles
+from lira.hal.bus.security.expiry import SOON_DAYS
+from lira.hal.bus.security.keys import CA, CERTIFICATE, KEY, KEY_MODE, NAME, NAMES, ROLES, Role, load_roles
 from lira.hal.errors import ConfigError, StorageError
 
 AUTHORITY, ROBOT, LAPTOP = "authority", "robot", "laptop"

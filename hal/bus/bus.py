@@ -13,16 +13,16 @@ from typing import Any, TypeVar
 
 import zenoh
 
-from lira.hal.bus.access_log import Refusals
 from lira.hal.bus.attachment import attach as attached
 from lira.hal.bus.boundary import Boundary
 from lira.hal.bus.connection import Connection, Declared
 from lira.hal.bus.endpoint import DEFAULT_ROBOT, check_address, check_name, is_loopback
-from lira.hal.bus.expiry import Reminder
-from lira.hal.bus.keys import Keys, keys_from_environment, load_keys
 from lira.hal.bus.publisher import Attach, Publisher
 from lira.hal.bus.questions import Answer, Questions, ask_once
 from lira.hal.bus.reader import Reader, Tap
+from lira.hal.bus.security.access_log import Refusals
+from lira.hal.bus.security.expiry import Reminder
+from lira.hal.bus.security.keys import Keys, keys_from_environment, load_keys
 from lira.hal.bus.topics import COMMANDS, Qos, Topic, named
 from lira.hal.bus.zenoh_session import open_session
 from lira.hal.clock import TimeBase, unix_offset_s

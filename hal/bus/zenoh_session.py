@@ -10,8 +10,8 @@ import resource
 
 import zenoh
 
-from lira.hal.bus.access import access_list
-from lira.hal.bus.keys import Keys
+from lira.hal.bus.security.access import access_list
+from lira.hal.bus.security.keys import Keys
 from lira.hal.bus.topics import ATTACHMENT_BYTES, COMMANDS, MESSAGE_BYTES, QUESTION_BYTES, TOPICS, named
 from lira.hal.errors import BusError, ConfigError
 

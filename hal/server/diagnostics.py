@@ -5,9 +5,9 @@ import threading
 import time
 from dataclasses import replace
 
-from lira.hal.bus.access_log import FULL, LINK
 from lira.hal.bus.boundary import UNDECODABLE
 from lira.hal.bus.bus import Bus
+from lira.hal.bus.security.access_log import FULL, LINK
 from lira.hal.bus.topics import COMMANDS, DIAGNOSTICS
 from lira.hal.messages import DiagnosticArray, DiagnosticStatus
 from lira.hal.safety.arming import State

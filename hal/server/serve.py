@@ -4,9 +4,9 @@ import threading
 from collections.abc import Callable
 from contextlib import closing, nullcontext
 
-from lira.hal.bus.access_log import count_refusals
 from lira.hal.bus.bus import Bus
 from lira.hal.bus.endpoint import DEFAULT_ENDPOINT, DEFAULT_ROBOT
+from lira.hal.bus.security.access_log import count_refusals
 from lira.hal.messages import CameraInfo
 from lira.hal.port import Arena, Robot
 from lira.hal.safety.governed import GovernedRobot

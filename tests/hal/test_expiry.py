@@ -7,10 +7,10 @@ import pytest
 from cryptography import x509
 from wiring import new_endpoint, new_name, wait_for
 
-from lira.hal.bus import expiry
 from lira.hal.bus.bus import Bus
-from lira.hal.bus.expiry import Reminder, ends_at, reminder
-from lira.hal.bus.keys import CERTIFICATE, load_keys
+from lira.hal.bus.security import expiry
+from lira.hal.bus.security.expiry import Reminder, ends_at, reminder
+from lira.hal.bus.security.keys import CERTIFICATE, load_keys
 from lira.tools.authority import init, renew
 
 NOW = datetime(2030, 5, 1, 12, tzinfo=UTC)

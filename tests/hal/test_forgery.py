@@ -10,11 +10,11 @@ import zenoh
 from wiring import joined, real_time_null, remote, served, wait_for
 from zenoh.handlers import FifoChannel
 
-from lira.hal.bus.access import access_list
 from lira.hal.bus.attachment import Attachment, parse_attachment
 from lira.hal.bus.bus import Bus
-from lira.hal.bus.keys import Role
 from lira.hal.bus.reader import Received
+from lira.hal.bus.security.access import access_list
+from lira.hal.bus.security.keys import Role
 from lira.hal.bus.services import look_at_estop, press_estop
 from lira.hal.bus.topics import APPLIED, CMD_VEL, ESTOP_LOOK, ESTOP_PRESS, INFO, SCAN, TELEOP, named
 from lira.hal.messages import STOP, Applied, Command, LaserScan, Reason, Source, Twist

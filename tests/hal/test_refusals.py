@@ -1,6 +1,6 @@
 """What zenoh's log tells of those it kept out. That zenoh writes such a log is tested with keys, in tests/tools."""
 
-from lira.hal.bus.access_log import FULL, LINK, MESSAGE, Refusals
+from lira.hal.bus.security.access_log import FULL, LINK, MESSAGE, Refusals
 
 TLS = b"2026-01-01T00:00:00Z  WARN acc-0 ThreadId(05) zenoh_link_tls::unicast: received corrupt message of type X."
 HINT = b" Hint: increase the system open file limit.\n"

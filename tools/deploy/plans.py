@@ -6,7 +6,7 @@ from pathlib import Path
 
 import msgspec
 
-from lira.hal.bus.keys import VARIABLE, load_keys
+from lira.hal.bus.security.keys import VARIABLE, load_keys
 from lira.hal.errors import ConfigError
 from lira.tools.deploy import packages, units
 from lira.tools.deploy.plan import SECRET, File, Plan

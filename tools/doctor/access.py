@@ -5,7 +5,7 @@ import grp
 import os
 from pathlib import Path
 
-from lira.hal.bus.keys import VARIABLE, keys_from_environment
+from lira.hal.bus.security.keys import VARIABLE, keys_from_environment
 from lira.tools.doctor.finding import Finding, Patient, fail, ok, warn
 from lira.tools.joystick.device.rules import PLACE, REMEDY
 from lira.tools.joystick.pads.nodes import is_any_pad, motion_of, read_nodes

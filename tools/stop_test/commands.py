@@ -4,7 +4,7 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from lira.hal.bus.keys import VARIABLE as KEYS_VARIABLE
+from lira.hal.bus.security.keys import VARIABLE as KEYS_VARIABLE
 from lira.tools.stop_test.mutants import Mutant
 from lira.tools.stop_test.parts import launch
 from lira.tools.stop_test.setups import Setup, clock_library

@@ -11,7 +11,7 @@ from cryptography.hazmat.primitives import hashes
 from cryptography.hazmat.primitives.asymmetric import ec
 from cryptography.hazmat.primitives.serialization import Encoding, load_pem_private_key
 
-from lira.hal.bus.keys import CERTIFICATE, KEY
+from lira.hal.bus.security.keys import CERTIFICATE, KEY
 from lira.tools.authority import AUTHORITY
 from lira.tools.launch.processes import lira_command
 from lira.tools.stop_test.acts import StopTestError

@@ -236,20 +236,20 @@ def trust_names() -> None:
 
 def promote_viewers() -> None:
     """Take every viewer for an operator."""
-    keys = import_module("lira.hal.bus.keys")
+    keys = import_module("lira.hal.bus.security.keys")
     after(keys, "load_roles", lambda roles, *_: roles and dict.fromkeys(roles, keys.Role.OPERATOR))
 
 
 def keep_expired_links() -> None:
     """Let a link live longer than the certificate that it was opened with."""
-    from lira.hal.bus.keys import Keys
+    from lira.hal.bus.security.keys import Keys
 
     after(Keys, "link_config", lambda config, *_: config | {"close_link_on_expiration": False})
 
 
 def never_read_keys_again() -> None:
     """Believe for ever who was enrolled at the start."""
-    from lira.hal.bus.keys import Keys
+    from lira.hal.bus.security.keys import Keys
 
     swap(Keys, "changed", lambda _: False)
 

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 import msgspec
 
 from lira.hal.bus.bus import Bus
-from lira.hal.bus.keys import load_keys
+from lira.hal.bus.security.keys import load_keys
 from lira.hal.bus.services import release_estop
 from lira.hal.bus.topics import APPLIED, DIAGNOSTICS, INFO, RESET
 from lira.hal.errors import BusError

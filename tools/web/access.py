@@ -10,7 +10,7 @@ import ssl
 from dataclasses import dataclass, field
 from urllib.parse import urlsplit
 
-from lira.hal.bus.keys import CERTIFICATE, KEY, Keys
+from lira.hal.bus.security.keys import CERTIFICATE, KEY, Keys
 from lira.hal.errors import ConfigError
 
 COOKIE = "lira"

@@ -8,7 +8,7 @@ from contextlib import contextmanager
 import zenoh
 
 from lira.hal.bus.bus import Bus
-from lira.hal.bus.keys import Role, load_keys
+from lira.hal.bus.security.keys import Role, load_keys
 from lira.hal.messages import Command, Twist
 from lira.hal.profile import load_profile
 from lira.hal.safety.governed import GovernedRobot

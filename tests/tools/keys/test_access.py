@@ -9,7 +9,7 @@ from zenoh import ext
 
 from lira.hal.bus.attachment import Attachment, parse_attachment
 from lira.hal.bus.bus import Bus
-from lira.hal.bus.keys import load_keys
+from lira.hal.bus.security.keys import load_keys
 from lira.hal.bus.services import ask_info, look_at_estop, press_estop, release_estop
 from lira.hal.bus.topics import BATTERY, ESTOP_LOOK, ESTOP_PRESS, ESTOP_RELEASE, INFO, RESET
 from lira.hal.client.connect import open_remote

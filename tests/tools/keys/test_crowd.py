@@ -10,7 +10,7 @@ import pytest
 from keyed_bed import NAME, make_keys, wait_for
 
 from lira.hal.bus.bus import Bus
-from lira.hal.bus.keys import load_keys
+from lira.hal.bus.security.keys import load_keys
 from lira.hal.bus.topics import DIAGNOSTICS, INFO
 from lira.tools.launch.processes import ChildProcess, free_port, lira_command
 

@@ -8,7 +8,7 @@ import pytest
 from keyed_bed import GO, NAME, drive_until, make_keys, plain_session, wait_for
 
 from lira.hal.bus.bus import Bus
-from lira.hal.bus.keys import KEY, ROLES, load_keys
+from lira.hal.bus.security.keys import KEY, ROLES, load_keys
 from lira.hal.bus.services import look_at_estop, press_estop
 from lira.hal.bus.topics import APPLIED, CMD_VEL, DIAGNOSTICS, JOY, OPERATOR, SIM_STATE
 from lira.hal.client.connect import open_remote

@@ -8,7 +8,7 @@ import pytest
 from keyed_bed import GO, NAME, drive_until, make_keys, serving, wait_for
 
 from lira.hal.bus.bus import Bus
-from lira.hal.bus.keys import CA, CERTIFICATE, KEY, ROLES, load_keys
+from lira.hal.bus.security.keys import CA, CERTIFICATE, KEY, ROLES, load_keys
 from lira.hal.bus.services import look_at_estop
 from lira.hal.client.connect import open_remote
 from lira.hal.errors import BusError

@@ -9,7 +9,7 @@ import msgspec
 import numpy as np
 import pytest
 
-from lira.hal.bus.keys import Keys
+from lira.hal.bus.security.keys import Keys
 from lira.hal.bus.services import Info
 from lira.hal.errors import ConfigError, DeviceError
 from lira.hal.messages import (

@@ -15,8 +15,8 @@ import zenoh
 
 from lira.hal.bus.attachment import MAGIC, Attachment
 from lira.hal.bus.bus import Bus
-from lira.hal.bus.keys import load_keys
 from lira.hal.bus.publisher import Publisher
+from lira.hal.bus.security.keys import load_keys
 from lira.hal.bus.services import look_at_estop, release_estop
 from lira.hal.bus.topics import APPLIED, CMD_VEL, TELEOP, Topic, named
 from lira.hal.errors import BusError

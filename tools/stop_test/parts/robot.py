@@ -15,8 +15,8 @@ from pathlib import Path
 
 import numpy as np
 
-from lira.hal.bus.access_log import count_refusals
 from lira.hal.bus.bus import Bus
+from lira.hal.bus.security.access_log import count_refusals
 from lira.hal.messages import Applied, Command, Image, LaserScan, Observation
 from lira.hal.messages.compression import compress
 from lira.hal.port import Robot

@@ -59,7 +59,7 @@ def _days(text: str) -> timedelta:
 
 def run(args: argparse.Namespace) -> int:
     """Do what is asked."""
-    from lira.hal.bus.keys import CA, CERTIFICATE, ROLES, Role
+    from lira.hal.bus.security.keys import CA, CERTIFICATE, ROLES, Role
     from lira.tools.authority import PEER_LIFE, ROBOT, enroll, init, renew, revoke
 
     folder: Path = args.folder

@@ -49,7 +49,7 @@ def run(args: argparse.Namespace) -> int:
         print(f"written: {args.screenshot}")
         return 0
 
-    from lira.hal.bus.keys import keys_from_environment
+    from lira.hal.bus.security.keys import keys_from_environment
     from lira.tools.launch.notify import Notifier
     from lira.tools.operator.beside import beside
     from lira.tools.operator.listen import Ears

@@ -14,7 +14,7 @@ from collections import Counter
 
 import zenoh
 
-from lira.hal.bus.keys import keys_from_environment
+from lira.hal.bus.security.keys import keys_from_environment
 
 LINK, FULL, MESSAGE = "links", "links for want of files", "messages"
 # One line for each link that its acceptor gave up, one for each message that the access list stopped, nothing else.

@@ -8,7 +8,7 @@ commands are passed on to nobody, since whoever hears one could copy what tells 
 from collections.abc import Mapping
 from typing import Any
 
-from lira.hal.bus.keys import Role
+from lira.hal.bus.security.keys import Role
 from lira.hal.bus.topics import (
     COMMANDS,
     ESTOP,

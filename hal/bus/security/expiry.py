@@ -12,7 +12,7 @@ from contextlib import suppress
 from datetime import UTC, datetime
 from pathlib import Path
 
-from lira.hal.bus.keys import CERTIFICATE, Keys
+from lira.hal.bus.security.keys import CERTIFICATE, Keys
 
 SOON_DAYS = 7
 DAY_S = 86400.0
