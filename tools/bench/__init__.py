@@ -10,24 +10,33 @@ from pathlib import Path
 
 Row = dict[str, object]
 
+# Those in `learning/`.
+LEARNING = {
+    "preprocess": "a JPEG of 640x480 to 32x32 gray, beside full decoding and resizing",
+    "decide": "a decision of three networks, beside the same networks in PyTorch",
+    "step": "where the time of one decision step goes, and of a whole run on line-obstacles",
+    "train": "one training step, beside plain PyTorch (and Keras, if installed), and what it does to the control loop",
+    "log": "a million labels: the log written, opened and learned from, and the memory that takes",
+    "trial": "trials of the usual methods, medians over --seeds: seconds, those of the processor, and their shares",
+}
 BENCHES = {
     "twin": "the twin in process: times real time as a sketch and in pybullet, which is put beside its bare calls",
-    "trial": "trials of the usual methods, medians over --seeds: seconds, those of the processor, and their shares",
     "lockstep": "twin and learner in two processes over the bus in lockstep: times real time",
     "latency": "from a capture to the applied command through the whole stack, beside a bare zenoh echo",
     "takeover": "from pressing the dead-man to the applied command, while a policy drives",
     "web": "the page: what a browser fetches, how soon it sees a picture, what three of them cost",
-    "decide": "a decision of three networks, beside the same networks in PyTorch",
-    "train": "one training step, beside plain PyTorch (and Keras, if installed), and what it does to the control loop",
     "drivers": "what the drivers need of a core, how old a published scan is, what the lidar's line loses in --minutes",
-    "step": "where the time of one decision step goes, and of a whole run on line-obstacles",
     "record": "control beside a recorder and without, for --minutes each; the recorder's share of a core, and losses",
-    "log": "a million labels: the log written, opened and learned from, and the memory that takes",
-    "preprocess": "a JPEG of 640x480 to 32x32 gray, beside full decoding and resizing",
     "fuzz": "garbage to every decoder that faces the bus",
     "soak": "twin, learner, joystick bridge and console for --minutes: memory, threads and files stay flat",
+    **LEARNING,
 }
 PACKAGES = ("numpy", "opencv-python-headless", "rosbags", "eclipse-zenoh", "pybullet", "torch")
+
+
+def module_of(name: str) -> str:
+    """Return the full name of a benchmark's module."""
+    return f"{__name__}.learning.{name}" if name in LEARNING else f"{__name__}.{name}"
 
 
 def describe_machine() -> Row:

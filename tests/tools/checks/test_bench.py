@@ -1,4 +1,5 @@
 import json
+from importlib.util import find_spec
 
 from fresh import python
 
@@ -66,6 +67,10 @@ def test_the_machine_is_described():
 def test_a_processor_without_a_name_still_gets_one(tmp_path):
     (tmp_path / "cpuinfo").write_text("flags: none\n")
     assert bench.cpu_model(tmp_path / "cpuinfo")
+
+
+def test_every_benchmark_has_its_module():
+    assert all(find_spec(bench.module_of(name)) for name in bench.BENCHES)
 
 
 def test_an_unknown_bench_is_refused(capsys):

@@ -9,7 +9,7 @@ from short_trials import write_world
 from lira.fusion.control import ControlLoop
 from lira.fusion.modalities.image import gray_image
 from lira.hal.messages import CompressedImage
-from lira.tools.bench import decide, log, preprocess, step, train
+from lira.tools.bench.learning import decide, log, preprocess, step, train
 
 
 def test_preprocess_compares_two_ways_to_the_same_image(monkeypatch):

@@ -5,7 +5,7 @@ import pytest
 
 from lira.fusion.teaching.teacher import ScriptedTeacher
 from lira.sim_backend.camera import PinholeCamera
-from lira.tools.bench import trial as bench
+from lira.tools.bench.learning import trial as bench
 from lira.tools.experiments.methods import USUAL
 from lira.tools.experiments.trial import Trial
 

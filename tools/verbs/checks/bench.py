@@ -18,7 +18,7 @@ import sys
 from pathlib import Path
 
 from lira.hal.errors import ConfigError
-from lira.tools.bench import BENCHES, Row, describe_machine
+from lira.tools.bench import BENCHES, Row, describe_machine, module_of
 from lira.tools.options import add_json, positive
 from lira.tools.output.machine import output_for, table, tell
 
@@ -47,7 +47,7 @@ def run(args: argparse.Namespace) -> int:
     if args.seeds is not None and args.name not in SEEDED:
         raise ConfigError(f"'{args.name}' takes no --seeds", f"Only {' and '.join(SEEDED)} does.")
     output = output_for(args.json)
-    module = importlib.import_module(f"lira.tools.bench.{args.name}")
+    module = importlib.import_module(module_of(args.name))
     given = [value for value in (args.minutes, args.seeds) if value is not None]
     results: list[Row] = module.run(*given)
     found = {"name": args.name, "machine": describe_machine(), "results": results}

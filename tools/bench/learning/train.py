@@ -34,7 +34,8 @@ from lira.fusion.learning.trainer import Beginning, ProcessTrainer
 from lira.fusion.policies.networks import ExpertNet, FusionNet
 from lira.fusion.preprocess import Features, Shape
 from lira.hal.messages import Driver
-from lira.tools.bench import Row, keras_reference
+from lira.tools.bench import Row
+from lira.tools.bench.learning import keras_reference
 
 RUNS = 5
 LABELS = 300
