@@ -11,7 +11,7 @@ from lira.hal.profile import Camera
 from lira.robot.camera.address import shown
 from lira.robot.camera.fit import fit
 from lira.robot.camera.port import Picture, Source
-from lira.robot.camera.source import open_source
+from lira.robot.camera.sources.opening import open_source
 
 GRAB_S = 0.2
 FIRST_S = 8.0  # some cameras take their time to begin

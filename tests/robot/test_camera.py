@@ -7,7 +7,7 @@ from rude_cameras import claiming, jpeg
 
 from lira.hal.errors import ConfigError, DeviceError, MissingExtraError
 from lira.hal.messages import CompressedImage
-from lira.robot.camera.source import open_source
+from lira.robot.camera.sources.opening import open_source
 from lira.sim_backend.emulators.camera import MjpegServer
 
 
@@ -113,7 +113,7 @@ def test_depth_of_a_camera_that_has_none_is_refused(tmp_path):
 
 def test_without_the_library_a_video_camera_says_what_to_install(monkeypatch):
     monkeypatch.setitem(sys.modules, "av", None)
-    monkeypatch.delitem(sys.modules, "lira.robot.camera.video", raising=False)
+    monkeypatch.delitem(sys.modules, "lira.robot.camera.sources.video", raising=False)
     with pytest.raises(MissingExtraError) as told:
         open_source("rtsp://127.0.0.1:1/", (640, 480), None)
     assert "lira-rosbot[video]" in told.value.remedy

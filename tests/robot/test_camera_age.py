@@ -13,9 +13,9 @@ from rude_cameras import Server, clock_stream, rtsp, taken_s
 
 from lira.hal.errors import DeviceError, SensorError
 from lira.hal.messages import CompressedImage
-from lira.robot.camera import drain as drain_module
-from lira.robot.camera.drain import Drain, Frame
-from lira.robot.camera.stream_clock import LATE_S, SETTLE_S, StreamClock
+from lira.robot.camera.sources import drain as drain_module
+from lira.robot.camera.sources.drain import Drain, Frame
+from lira.robot.camera.sources.stream_clock import LATE_S, SETTLE_S, StreamClock
 
 FRESH_S = 0.3
 HONEST_S = 0.3  # what the camera itself takes to encode and send is not measured, and a test machine is slow
@@ -203,7 +203,7 @@ def test_what_waited_in_a_stalled_network_is_not_shown_as_new():
 
 
 def test_a_password_of_an_rtsp_address_is_in_no_message(capfd):
-    from lira.robot.camera.source import open_source
+    from lira.robot.camera.sources.opening import open_source
 
     def refuse(server, connection, _):
         connection.sendall(b"RTSP/1.0 401 Unauthorized\r\nCSeq: 1\r\n\r\n")

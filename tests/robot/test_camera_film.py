@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from lira.hal.errors import DeviceError, SensorError
-from lira.robot.camera.source import open_source
+from lira.robot.camera.sources.opening import open_source
 
 av = pytest.importorskip("av", reason="needs av: pip install 'lira-rosbot[video]'")
 RATE_HZ, COUNT = 20, 8

@@ -12,8 +12,8 @@ from hypothesis import strategies as st
 from rude_cameras import Server, claiming, jpeg, part, stream
 
 from lira.hal.errors import DeviceError
-from lira.robot.camera.multipart import find_boundary, parse_parts
-from lira.robot.camera.source import open_source
+from lira.robot.camera.sources.multipart import find_boundary, parse_parts
+from lira.robot.camera.sources.opening import open_source
 
 PARTS = b"".join(b"--x\r\nContent-Type: image/jpeg\r\n%s\r\n%s\r\n" % (b"Content-Length: %d\r\n" % 40, body)
                  for body in (b"--x\r\n\r\n" + b"a" * 33, b"b" * 40))  # fmt: skip
@@ -80,7 +80,7 @@ def raw_stream(*pieces):
     ids=["endless head", "long", "longest", "endless body", "boundaries", "noise"],
 )
 def test_an_odd_part_of_a_stream_is_passed_over(odd, monkeypatch):
-    monkeypatch.setattr("lira.robot.camera.multipart.LARGEST_BYTES", 500_000)
+    monkeypatch.setattr("lira.robot.camera.sources.multipart.LARGEST_BYTES", 500_000)
     with raw_stream(part(jpeg(1)), odd, part(jpeg(2)) * 2) as (url, asked), Watch(url) as watch:
         assert watch.wait(2).data == jpeg(2)
         assert len(asked) == 1

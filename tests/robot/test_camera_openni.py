@@ -8,7 +8,7 @@ from fresh import python
 
 from lira.hal.errors import DeviceError
 from lira.hal.messages import Image
-from lira.robot.camera.source import open_source
+from lira.robot.camera.sources.opening import open_source
 
 
 @pytest.fixture
@@ -49,7 +49,8 @@ def test_openni_gives_depth_beside_the_pictures_and_it_can_be_opened_again(openn
 def test_a_camera_that_is_lost_is_opened_again_with_its_depth(openni, monkeypatch):
     with Watch("openni:Dummy", openni, depth=True) as watch:
         watch.wait(3)
-        monkeypatch.setattr("lira.robot.camera.astra.openni2.wait_for_any_stream", lambda *_: None)  # it says no more
+        wait = "lira.robot.camera.sources.astra.openni2.wait_for_any_stream"
+        monkeypatch.setattr(wait, lambda *_: None)  # it says no more
         until_s = time.monotonic() + 3.0
         while watch.supervisor.alive:
             assert time.monotonic() < until_s
@@ -82,7 +83,7 @@ def test_openni_loads_from_the_right_folder_after_it_failed_in_a_wrong_one(openn
     code = f"""
 from pathlib import Path
 from lira.hal.errors import DeviceError
-from lira.robot.camera.astra import load
+from lira.robot.camera.sources.astra import load
 for folder in (Path({str(broken)!r}), Path({str(tmp_path / "nothing")!r}), Path({str(broken)!r})):
     try:
         load(folder)

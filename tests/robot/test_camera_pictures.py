@@ -14,8 +14,8 @@ from lira.hal.errors import SensorError
 from lira.hal.messages import CompressedImage, Image
 from lira.hal.messages.compression import PICTURE_LIMIT_BYTES
 from lira.robot.camera.fit import fit
-from lira.robot.camera.folder import load
 from lira.robot.camera.header import read_header
+from lira.robot.camera.sources.folder import load
 
 SIZE = (640, 480)
 LARGE_JPEG, SMALL_JPEG = jpeg(0, noise=1.0), jpeg(50)

@@ -18,7 +18,7 @@ PROCESSES = (
     "lira.hal.server",
     "lira.hal.client",
     "lira.robot.camera.device",
-    "lira.robot.camera.source",
+    "lira.robot.camera.sources.opening",
     "lira.robot.core2.device",
     "lira.robot.rosbot",
     "lira.robot.rplidar.device",

@@ -17,7 +17,7 @@ from lira.hal.profile import load_profile
 from lira.hal.safety.governed import GovernedRobot
 from lira.hal.server.server import HalServer
 from lira.hal.testing import NullRobot
-from lira.robot.camera.stream_clock import LATE_S
+from lira.robot.camera.sources.stream_clock import LATE_S
 from lira.tools.cli import main
 from lira.tools.doctor import access, machine
 from lira.tools.doctor.checks import CHECKS, Check, examine, worst

@@ -11,10 +11,10 @@ import numpy as np
 from lira.hal.errors import DeviceError, SensorError
 from lira.hal.messages import CompressedImage, Image
 from lira.robot.camera.address import Address, parse_address
-from lira.robot.camera.drain import Drain, Frame
 from lira.robot.camera.fit import Size, check_shape
 from lira.robot.camera.port import Picture
-from lira.robot.camera.stream_clock import LATE_S, StreamClock
+from lira.robot.camera.sources.drain import Drain, Frame
+from lira.robot.camera.sources.stream_clock import LATE_S, StreamClock
 
 OPEN_S, READ_S = 8.0, 5.0
 SOCKET_US = "5000000"

@@ -8,9 +8,9 @@ import time
 from lira.hal.errors import DeviceError
 from lira.hal.messages import CompressedImage
 from lira.robot.camera.address import Address, parse_address
-from lira.robot.camera.drain import Drain, Frame
-from lira.robot.camera.http_stream import FAULTS, HttpStream, words
-from lira.robot.camera.multipart import LARGEST_HEAD, find_boundary, parse_parts
+from lira.robot.camera.sources.drain import Drain, Frame
+from lira.robot.camera.sources.http_stream import FAULTS, HttpStream, words
+from lira.robot.camera.sources.multipart import LARGEST_HEAD, find_boundary, parse_parts
 
 FIRST_S = 10.0  # until the first picture: some cameras begin slowly
 SILENCE_S = 1.0

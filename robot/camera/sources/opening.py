@@ -41,23 +41,23 @@ def open_source(url: str, size: tuple[int, int], openni_folder: Path | None, *, 
 def _open(url: str, scheme: str, size: tuple[int, int], openni_folder: Path | None, *, depth: bool) -> Source | None:
     """Open what a scheme names; None if it names nothing. Each kind's packages are imported only for it."""
     if scheme == "openni":
-        from lira.robot.camera.astra import OpenniSource
+        from lira.robot.camera.sources.astra import OpenniSource
 
         return OpenniSource(url.removeprefix("openni:"), size, openni_folder, depth=depth)
     if scheme in ("http", "https"):
-        from lira.robot.camera.mjpeg import MjpegSource
+        from lira.robot.camera.sources.mjpeg import MjpegSource
 
         return MjpegSource(url)
     if scheme in ("rtsp", "rtsps") or url.startswith("/dev/"):
-        from lira.robot.camera.video import VideoSource
+        from lira.robot.camera.sources.video import VideoSource
 
         return VideoSource(url, size)
     if Path(url).is_dir():
-        from lira.robot.camera.folder import FolderSource
+        from lira.robot.camera.sources.folder import FolderSource
 
         return FolderSource(Path(url))
     if Path(url).is_file():
-        from lira.robot.camera.film import FilmSource
+        from lira.robot.camera.sources.film import FilmSource
 
         return FilmSource(Path(url), size)
     return None

@@ -11,7 +11,7 @@ import numpy as np
 from lira.hal.errors import DeviceError, SensorError
 from lira.hal.messages import Image
 from lira.robot.camera.fit import Size, check_shape
-from lira.robot.camera.video import FAULTS, words
+from lira.robot.camera.sources.video import FAULTS, words
 
 
 class FilmSource:

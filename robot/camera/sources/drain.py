@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from typing import Generic, TypeVar
 
 from lira.hal.errors import SensorError
-from lira.robot.camera.stream_clock import LATE_S, StreamClock
+from lira.robot.camera.sources.stream_clock import LATE_S, StreamClock
 
 JOIN_S = 1.5
 Body = TypeVar("Body")
