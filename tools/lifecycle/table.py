@@ -84,7 +84,7 @@ PROCESSES: tuple[Process, ...] = (
     Process(
         "monitor",
         "hears rates, ages and who drives, for `lira status`",
-        lambda setup: ["-m", "lira.tools.lifecycle.monitor", setup.name, setup.endpoint],
+        lambda setup: ["-m", "lira.tools.lifecycle.watch.monitor", setup.name, setup.endpoint],
     ),
     Process(
         "recorder",

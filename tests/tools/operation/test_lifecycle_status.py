@@ -17,13 +17,13 @@ from lira.tools.cli import main
 from lira.tools.lifecycle import folder as folders
 from lira.tools.lifecycle import services
 from lira.tools.lifecycle.folder import AlreadyUpError, StateFolder
-from lira.tools.lifecycle.line import WINDOW_S, Rate
 from lira.tools.lifecycle.logs import Follower, last_lines
-from lira.tools.lifecycle.monitor import rate_of
 from lira.tools.lifecycle.records import HEARD, STATE, Heard, ProcessState, State, TopicState
 from lira.tools.lifecycle.restart import CALM_S, Phase
 from lira.tools.lifecycle.setup import Setup
-from lira.tools.lifecycle.status import as_object, as_text, look
+from lira.tools.lifecycle.watch.line import WINDOW_S, Rate
+from lira.tools.lifecycle.watch.monitor import rate_of
+from lira.tools.lifecycle.watch.status import as_object, as_text, look
 from lira.tools.verbs import VERBS, module_of
 
 SETUP = Setup(processes=("twin", "learner"), world="line")

@@ -25,7 +25,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Tell what is up."""
     from lira.tools.lifecycle.folder import meant, names
-    from lira.tools.lifecycle.status import as_object, as_text, look
+    from lira.tools.lifecycle.watch.status import as_object, as_text, look
 
     name = meant(args.name)
     status = look(name, time.monotonic())

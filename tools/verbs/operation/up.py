@@ -37,7 +37,7 @@ def run(args: argparse.Namespace) -> int:
     from lira.tools.lifecycle.control import bring_up, supervise
     from lira.tools.lifecycle.ports import free_from
     from lira.tools.lifecycle.setup import PAGE_PORT, PORT, command_line
-    from lira.tools.lifecycle.status import as_text, look
+    from lira.tools.lifecycle.watch.status import as_text, look
 
     before = look(args.name, time.monotonic())
     if before.state is not None:

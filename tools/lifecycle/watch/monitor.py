@@ -3,7 +3,7 @@
 `lira status` reads that instead of opening a bus, so it answers at once. Pictures are listened to on this machine only:
 over the radio they would be sent once more.
 
-python -m lira.tools.lifecycle.monitor NAME HOST:PORT
+python -m lira.tools.lifecycle.watch.monitor NAME HOST:PORT
 """
 
 import sys
@@ -21,8 +21,8 @@ from lira.hal.profile import RobotProfile
 from lira.tools.launch.lifetime import process
 from lira.tools.launch.notify import Notifier
 from lira.tools.lifecycle.folder import StateFolder
-from lira.tools.lifecycle.line import Line
 from lira.tools.lifecycle.records import HEARD, Heard
+from lira.tools.lifecycle.watch.line import Line
 from lira.tools.operator.beside import beside
 from lira.tools.operator.view import View
 from lira.tools.operator.voice import speak
