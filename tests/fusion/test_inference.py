@@ -167,7 +167,8 @@ class Blocked:
             raise AssertionError(f"{name} is imported")
 
 sys.meta_path.insert(0, Blocked())
-import lira.tools.live.sitting, lira.tools.runs.alone, lira.tools.runs.with_person, lira.tools.verbs.learn.drive
+import lira.tools.live.sitting, lira.tools.verbs.learn.drive
+import lira.tools.runs.remote.alone, lira.tools.runs.remote.with_person
 from lira.fusion.methods.presets import method_named
 from lira.tools.runs.build import build_method
 from lira.fusion.experts.load import load_alone

@@ -26,7 +26,7 @@ from lira.tools.runs.folder import in_the_log
 from lira.tools.runs.names import LABELS, RECORD
 from lira.tools.runs.plan import Plan
 from lira.tools.runs.progress import Say
-from lira.tools.runs.reach import hand_of, reports_of, request_line, world_in, world_of
+from lira.tools.runs.remote.reach import hand_of, reports_of, request_line, world_in, world_of
 
 
 @dataclass(frozen=True, slots=True)

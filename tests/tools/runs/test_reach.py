@@ -5,7 +5,7 @@ import pytest
 
 from lira.hal.errors import BusError
 from lira.sim_backend.catalogue import load_world
-from lira.tools.runs.reach import world_in
+from lira.tools.runs.remote.reach import world_in
 
 
 def test_a_twin_tells_its_world_and_a_floor_none():

@@ -53,8 +53,8 @@ def run(args: argparse.Namespace) -> int:
     from lira.fusion.inference.threads import one_thread
     from lira.hal.client.connect import connect
     from lira.tools.output.say import say
-    from lira.tools.runs.alone import examine, show
-    from lira.tools.runs.reach import reports_of
+    from lira.tools.runs.remote.alone import examine, show
+    from lira.tools.runs.remote.reach import reports_of
 
     one_thread()
     check_named([args.policy], args.experts)

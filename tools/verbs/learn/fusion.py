@@ -104,8 +104,8 @@ def run(args: argparse.Namespace) -> int:
         if args.teacher == "none":
             return learn_by_hand(args, plan, robot)
         from lira.tools.output.say import say
-        from lira.tools.runs.on_twin import teach
-        from lira.tools.runs.reach import reports_of
+        from lira.tools.runs.remote.on_twin import teach
+        from lira.tools.runs.remote.reach import reports_of
 
         return teach(args, plan, robot, reports_of(robot), say)
 
@@ -114,8 +114,8 @@ def learn_by_hand(args: argparse.Namespace, plan: "Plan", robot: "RemoteRobot") 
     """Learn from whoever takes control."""
     from lira.fusion.learning.trainer import ProcessTrainer
     from lira.tools.output.say import say
-    from lira.tools.runs.reach import reports_of
-    from lira.tools.runs.with_person import learn_from_person
+    from lira.tools.runs.remote.reach import reports_of
+    from lira.tools.runs.remote.with_person import learn_from_person
 
     return learn_from_person(args, plan, robot, ProcessTrainer, reports_of(robot), say)
 

@@ -14,7 +14,7 @@ from lira.tools.launch.notify import Notifier
 from lira.tools.operator.voice import explain
 from lira.tools.runs.course import Course, show_alone
 from lira.tools.runs.progress import Publish, Say, telling
-from lira.tools.runs.reach import PAUSED, arena_of, request_line, restarter, world_of
+from lira.tools.runs.remote.reach import PAUSED, arena_of, request_line, restarter, world_of
 
 
 def show(args: argparse.Namespace, robot: RemoteRobot, publish: Publish, say: Say) -> int:

@@ -24,7 +24,7 @@ from lira.tools.runs.folder import learn_again, snapshot
 from lira.tools.runs.names import LABELS, RECORD
 from lira.tools.runs.plan import Plan, build_traced
 from lira.tools.runs.progress import Publish, Say
-from lira.tools.runs.reach import PAUSED, hand_of, request_line, restarter, world_of
+from lira.tools.runs.remote.reach import PAUSED, hand_of, request_line, restarter, world_of
 
 
 def learn_from_person(

@@ -9,7 +9,7 @@ from lira.tools.recording.beside import recorder_beside
 from lira.tools.runs.folder import check_fresh
 from lira.tools.runs.plan import Plan
 from lira.tools.runs.progress import Publish, Say
-from lira.tools.runs.reach import arena_of
+from lira.tools.runs.remote.reach import arena_of
 from lira.tools.runs.teach import teach_on
 
 
