@@ -14,7 +14,7 @@ from lira.hal.rmw.hashes import type_hash
 from lira.tools.bench.parts.samples import MESSAGES
 from lira.tools.ros2.package import package_files
 
-SCRIPTS = Path(__file__).parent.parent / "robot" / "foreign"
+SCRIPTS = Path(__file__).parent / "foreign"
 NOT_INSTALLED = {"lira_msgs", "tf2_msgs"}  # PyPI has no wheel of tf2_msgs
 ENCODED = [(message, ros_type_of(type(message)), encode(message)) for message in MESSAGES]
 
