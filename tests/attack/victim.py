@@ -48,7 +48,7 @@ def make(kind, far, stack):
         robot = NullRobot(PROFILE)
         return robot, robot
     if kind == "ros2":
-        sys.path.insert(0, str(Path(__file__).parents[1] / "robot"))
+        sys.path.insert(0, str(Path(__file__).parents[1] / "support"))
         from ros2_peer import Peer
 
         from lira.robot.ros2.robot import Interface, Ros2Robot

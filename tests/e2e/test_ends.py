@@ -3,18 +3,14 @@
 import os
 import re
 import signal
-import sys
 import time
 from contextlib import ExitStack
 from pathlib import Path
 
 import pytest
+from ros2_peer import Peer
 
 from lira.tools.launch.processes import ChildProcess, free_port, lira_command
-
-sys.path.insert(0, str(Path(__file__).parents[1] / "robot"))
-
-from ros2_peer import Peer
 
 pytestmark = pytest.mark.slow
 

@@ -14,7 +14,7 @@ from lira.hal.client.connect import connect
 from lira.tools.cli import main
 from lira.tools.launch.processes import ChildProcess, free_port, lira_command
 
-SCRIPTS = Path(__file__).parent / "foreign"
+PEER = Path(__file__).with_name("sdk_peer.py")
 READY = "ZENOH_CONFIG_OVERRIDE="
 
 
@@ -33,7 +33,7 @@ def twin(tmp_path):
 
 
 def test_a_peer_that_nobody_here_wrote_lists_it_hears_it_and_drives_it(tmp_path):
-    command = sdk_command(SCRIPTS / "sdk_peer.py")
+    command = sdk_command(PEER)
     with twin(tmp_path) as (_, _, graph, _):
         words = [*command, str(graph), str(ros_share()), "9"]
         done = subprocess.run(words, capture_output=True, env=foreign_environment(), timeout=120, check=False)

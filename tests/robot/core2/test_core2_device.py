@@ -5,7 +5,6 @@ import time
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from refused import failure_of
 
 from lira.hal.messages import STOP, Odometry, Twist
 from lira.robot.core2.device import Core2
@@ -102,7 +101,7 @@ def test_it_finds_the_speed_and_learns_the_topics(tmp_path, baud):
         assert not bench.unit.crashed
 
 
-def test_a_board_at_no_speed_of_a_core2_is_refused(tmp_path):
+def test_a_board_at_no_speed_of_a_core2_is_refused(tmp_path, failure_of):
     bench = Bench(tmp_path / "base", Firmware(baud=9600, boot_s=0.0))
     bench.unit.receive(bytes.fromhex("fffe0000ff0000ff"), time.monotonic())  # it publishes, so something is heard
     assert "is no CORE2" in failure_of(bench.supervisor).what
@@ -239,7 +238,7 @@ def test_unplugged_it_says_so_and_comes_back(tmp_path):
         wait_for(lambda: bench.supervisor.alive, 6.0)
 
 
-def test_another_layout_of_a_topic_is_named(tmp_path):
+def test_another_layout_of_a_topic_is_named(tmp_path, failure_of):
     bench = Bench(tmp_path / "base", Firmware(boot_s=0.1, md5s=(("cmd_vel", "0" * 32),)))
     assert re.search(r"cmd_vel.*unknown layout", failure_of(bench.supervisor).what)
     bench.wire.close()

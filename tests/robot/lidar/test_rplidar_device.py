@@ -10,7 +10,6 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from refused import failure_of
 
 from lira.hal.profile import load_profile
 from lira.robot.rplidar import protocol
@@ -142,7 +141,7 @@ def test_an_error_is_reset_once(tmp_path):
         bench.wait_scans(1, 8.0)
 
 
-def test_a_broken_unit_is_refused_with_its_code(tmp_path):
+def test_a_broken_unit_is_refused_with_its_code(tmp_path, failure_of):
     bench = Bench(tmp_path / "lidar", Model(broken=True))
     refused = failure_of(bench.supervisor)
     bench.wire.close()
@@ -150,7 +149,7 @@ def test_a_broken_unit_is_refused_with_its_code(tmp_path):
     assert "turn freely" in refused.remedy
 
 
-def test_a_unit_at_no_speed_of_an_rplidar_is_refused(tmp_path):
+def test_a_unit_at_no_speed_of_an_rplidar_is_refused(tmp_path, failure_of):
     bench = Bench(tmp_path / "lidar", Model(baud=9600))
     bench.unit.begin(STANDARD_MODE, 660, time.monotonic())  # it streams, so something is heard
     assert "is no RPLIDAR" in failure_of(bench.supervisor).what
@@ -248,7 +247,7 @@ def test_a_warning_and_what_it_does_is_told(tmp_path):
     assert values["bytes lost"] == "0"
 
 
-def test_what_is_missing_or_no_lidar_is_named(tmp_path):
+def test_what_is_missing_or_no_lidar_is_named(tmp_path, failure_of):
     def failure(path):
         return failure_of(Supervisor("lidar", RPLidar(str(path), LIDAR, SETTINGS, lambda _: None).session))
 

@@ -13,7 +13,7 @@ from lira.hal.rmw.hashes import type_hash
 from lira.tools.cli import main
 from lira.tools.ros2.package import definitions, package_files
 
-ROOT = Path(__file__).parent.parent.parent
+ROOT = Path(__file__).parents[3]
 OURS = [f"{PACKAGE}/msg/{name.removesuffix('.msg')}" for name in definitions()]
 
 
