@@ -12,7 +12,7 @@ from lira.sim_backend.layout import build
 from lira.tools.cli import main
 from lira.tools.output.world_picture import FREE_M, LETTERS, OUTLINE, WIDE_PX, draw, from_above, view_poses
 
-PICTURES = Path(__file__).parents[2] / "sim_backend" / "pictures"
+PICTURES = Path(__file__).parents[3] / "sim_backend" / "pictures"
 
 
 def test_every_world_has_a_small_picture():
