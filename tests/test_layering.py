@@ -138,7 +138,8 @@ def test_the_readme_of_hal_names_every_module_and_no_other():
 
 
 def test_no_folder_is_a_warehouse():
-    for folder in {path.parent for package in MAY_IMPORT for path in modules(package)}:
+    # The tests lie as the code does, and who looks for one looks through a folder: those of a room fit the same bound.
+    for folder in {path.parent for package in [*MAY_IMPORT, "tests"] for path in modules(package)}:
         count = len([path for path in folder.glob("*.py") if path.name != "__init__.py"])
         assert count <= MOST_MODULES, f"{shown(folder)} has {count} modules"
 
