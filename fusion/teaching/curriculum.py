@@ -19,8 +19,9 @@ class Curriculum:
 
     With `proofs` every lap is driven anew, see `Anew`, and proven is who passes so many in a row that nobody was taught
     on; without, who passes the drives that were taught. `mirrored`: left and right are alike there, so each label is
-    learned with both exchanged, too. A training step follows every `labels_per_step`. `cruise_world` shows the sensor
-    nothing for the first `cruise_steps`: the cruise action is measured there.
+    learned with both exchanged, too. `back`: its drives lead back to a way. A training step follows every
+    `labels_per_step`. `cruise_world` shows the sensor nothing for the first `cruise_steps`: the cruise action is
+    measured there.
     """
 
     world: str
@@ -29,6 +30,7 @@ class Curriculum:
     laps: int
     proofs: int = 0
     mirrored: bool = False
+    back: bool = False
     labels_per_step: int = 30
     cruise_world: str = "straight"
     cruise_steps: int = 25
@@ -45,8 +47,9 @@ PROOFS = 3  # more of them are a matter of luck: of the shipped camera's ways ba
 class Anew:
     """A curriculum of which every lap, and every proof, is driven elsewhere.
 
-    Each drive gets a layout of its own and begins up to `APART_M` further on, on either side of the way and askew to
-    either side, each as much as it was or down to `LEAST` of that.
+    Each drive gets a layout of its own and begins up to `APART_M` further on, as far beside the way and as askew as it
+    was or down to `LEAST` of that, on either side of it and askew to either side: both together in a curriculum that
+    leads `back`, so that who drove back to the way still does.
     """
 
     course: Curriculum
@@ -63,12 +66,13 @@ class Anew:
 
     def _draw(self, *stream: int) -> list[Drive]:
         random = np.random.default_rng([self.seed, *stream])
-        return [_elsewhere(drive, random) for drive in self.course.drives]
+        return [_elsewhere(drive, random, together=self.course.back) for drive in self.course.drives]
 
 
-def _elsewhere(drive: Drive, random: np.random.Generator) -> Drive:
+def _elsewhere(drive: Drive, random: np.random.Generator, *, together: bool) -> Drive:
     layout, further_m = int(random.integers(LAYOUTS)), float(random.uniform(0.0, APART_M))
-    aside, askew = (random.choice((-1.0, 1.0), 2) * random.uniform(LEAST, 1.0, 2)).tolist()
+    sides = random.choice((-1.0, 1.0), 1 if together else 2)
+    aside, askew = (sides * random.uniform(LEAST, 1.0, 2)).tolist()
     began = drive.episode
     start_m = began.start_m + further_m if began.start_m else 0.0
     episode = Episode(layout, start_m, aside * began.lateral_m, askew * began.yaw_rad)
@@ -78,17 +82,26 @@ def _elsewhere(drive: Drive, random: np.random.Generator) -> Drive:
 STRICT = msgspec.structs.replace(PERFECT, style="proportional")  # experts are to be good: shown without faults
 STRAIGHT_ON = msgspec.structs.replace(STRICT, margin_m=0.2, horizon_s=2.0, follow_line=False)
 ASKEW = ((0.15, 0.0), (-0.15, 0.0), (0.3, 0.1), (-0.3, -0.1), (0.0, 0.2), (0.0, -0.2))  # metres aside, and yaw
+BESIDE = ((0.5, -0.3), (-0.5, 0.3), (0.9, -0.6), (-0.9, 0.6), (0.9, 0.0), (-0.9, 0.0), (0.3, 0.5), (-0.3, -0.5))
+# As a novice comes back from behind a box: mostly across the line, of which little is in view then.
+ACROSS = ((0.5, -0.3), (0.6, -1.2), (0.9, -0.6), (0.9, -1.2), (0.9, 0.0), (0.5, -0.9), (0.3, 0.5), (0.7, -1.0))
 
 
-def _line_camera(teacher: TeacherSettings, back_s: float = 8.0, back_m: float = 0.35) -> Curriculum:
+def _line_camera(
+    teacher: TeacherSettings, askew: Sequence[tuple[float, float]], apart_m: float, back_s: float, back_m: float
+) -> Curriculum:
     """A lap of the curved line, then starts beside it and askew: the expert has to find its way back (fig. E.2b)."""
-    askew = [(0.5, -0.3), (-0.5, 0.3), (0.9, -0.6), (-0.9, 0.6), (0.9, 0.0), (-0.9, 0.0), (0.3, 0.5), (-0.3, -0.5)]
     recoveries = [
-        Drive(Episode(0, start_m=3.0 + 4.0 * k, lateral_m=lateral, yaw_rad=yaw), back_s, "stay", final_lateral_m=back_m)
+        Drive(
+            Episode(0, start_m=3.0 + apart_m * k, lateral_m=lateral, yaw_rad=yaw),
+            back_s,
+            "stay",
+            final_lateral_m=back_m,
+        )
         for k, (lateral, yaw) in enumerate(askew)
     ]
     teacher = msgspec.structs.replace(teacher, lateral_m=0.2)
-    return Curriculum("line", teacher, (Drive(Episode(0), 300.0), *recoveries), laps=12)
+    return Curriculum("line", teacher, (Drive(Episode(0), 300.0), *recoveries), laps=12, back=True)
 
 
 def _line_lidar() -> Curriculum:
@@ -166,10 +179,11 @@ def _anew(course: Curriculum) -> Curriculum:
 
 CURRICULA = {
     DEFAULT: {
-        "camera": _anew(_line_camera(STRICT, back_s=5.0, back_m=0.2)),
+        "camera": _anew(_line_camera(STRICT, 2 * ACROSS, apart_m=2.8, back_s=5.0, back_m=0.2)),
         "lidar": _anew(_line_lidar()),
     },
-    "eight": {"camera": _line_camera(SKILLED)},  # Appendix C is about an expert taught as a person does: bang-bang
+    # Appendix C is about an expert taught as a person does: bang-bang.
+    "eight": {"camera": _line_camera(SKILLED, BESIDE, apart_m=4.0, back_s=8.0, back_m=0.35)},
     "passage": {"camera": _passage(), "lidar": _passage()},
     "garden": {"camera": _garden_camera(), "lidar": _garden_lidar()},
     "corridor": {"camera": _corridor_camera()},

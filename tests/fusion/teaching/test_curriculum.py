@@ -1,5 +1,6 @@
 """What an expert is trained on, lap by lap."""
 
+import numpy as np
 import pytest
 
 from lira.fusion.teaching.curriculum import APART_M, LEAST, Anew, curriculum
@@ -33,6 +34,21 @@ def test_a_drive_begins_as_far_off_as_it_did_or_less_and_on_either_side(kind):
             shares |= {round(after / before, 6) for before, after in pairs if before}
     assert all(LEAST <= abs(share) <= 1.0 for share in shares)
     assert min(shares) < 0.0 < max(shares)
+
+
+def test_left_and_right_are_exchanged_together_so_that_who_drives_back_to_the_line_still_does():
+    course = curriculum("camera", "line")
+    towards = [
+        now.episode
+        for number in range(1, 5)
+        for was, now in zip(course.drives, Anew(course, seed=0).taught(number), strict=True)
+        if was.episode.lateral_m * was.episode.yaw_rad < 0.0
+    ]
+    assert len(towards) > 40
+    assert all(episode.lateral_m * episode.yaw_rad < 0.0 for episode in towards)
+    course = curriculum("lidar", "line")  # who sees no line is put to either side and askew to either
+    starts = [drive.episode for number in range(1, 5) for drive in Anew(course, seed=0).taught(number)]
+    assert {np.sign(each.lateral_m * each.yaw_rad) for each in starts} >= {-1.0, 1.0}
 
 
 def test_every_forest_that_is_drawn_can_be_planted():
