@@ -1,9 +1,7 @@
 """A robot on the bus, a policy that drives it, `lira web`, and a real browser that looks at its page."""
 
 import contextlib
-import os
 import shutil
-import sys
 import threading
 import time
 from pathlib import Path
@@ -14,7 +12,7 @@ from lira.hal.bus.bus import Bus
 from lira.hal.bus.topics import APPLIED
 from lira.hal.client.connect import connect
 from lira.hal.messages import STOP, Command, Source, Twist
-from lira.tools.bench.parts import null_robot
+from lira.tools.bench.parts.robots import null_robot_at_work
 from lira.tools.launch.processes import ChildProcess, free_port, lira_command
 from lira.tools.launch.threads import in_thread
 
@@ -39,13 +37,9 @@ def policy(name, endpoint):
 
 
 @contextlib.contextmanager
-def robot_that_drives(folder):
+def robot_that_drives():
     """Its name, its address and the bus, while a policy drives it."""
-    name, endpoint = f"driven{os.getpid()}", f"127.0.0.1:{free_port()}"
-    command = [sys.executable, "-m", "lira.tools.bench.parts.null_robot", name, endpoint]
-    with contextlib.ExitStack() as stack:
-        server = stack.enter_context(ChildProcess("the robot", command, folder / "robot.log"))
-        server.wait_ready(null_robot.READY, 30.0)
+    with null_robot_at_work() as (name, endpoint, _), contextlib.ExitStack() as stack:
         bus = Bus(name, connect=endpoint)
         stack.callback(bus.close)
         stack.enter_context(policy(name, endpoint))
@@ -56,7 +50,7 @@ def robot_that_drives(folder):
 def page_of_robot(folder):
     """The bus, the page's address, and `lira web` as a process, while a policy drives the robot."""
     port = free_port()
-    with robot_that_drives(folder) as (name, endpoint, bus), contextlib.ExitStack() as stack:
+    with robot_that_drives() as (name, endpoint, bus), contextlib.ExitStack() as stack:
         words = ["--name", name, "--connect", endpoint, "--port", str(port)]
         web = stack.enter_context(ChildProcess("lira web", lira_command("web", *words), folder / "web.log"))
         web.wait_ready("web shows", 30.0)

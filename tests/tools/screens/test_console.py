@@ -30,7 +30,7 @@ from lira.hal.messages import (
     Twist,
 )
 from lira.hal.profile import load_profile
-from lira.tools.bench.parts import null_robot
+from lira.tools.bench.parts.robots import null_robot_at_work
 from lira.tools.bench.takeover import policy
 from lira.tools.cli import main
 from lira.tools.console import sound
@@ -38,7 +38,7 @@ from lira.tools.console.keyboard import keyboard_mapping, pad_of
 from lira.tools.console.picture import pixels_of
 from lira.tools.joystick.axes import action_of
 from lira.tools.joystick.client import TeleopClient
-from lira.tools.launch.processes import ChildProcess, free_port, lira_command
+from lira.tools.launch.processes import ChildProcess, lira_command
 from lira.tools.operator.listen import Ears
 from lira.tools.operator.situation import CORNERS, URGENCY, Situation, Urgency
 from lira.tools.operator.tones import TONES
@@ -227,15 +227,6 @@ sys.exit(main(sys.argv[1:]))
 """
 
 
-@contextlib.contextmanager
-def null_robot_on_the_bus(tmp_path):
-    name, endpoint = f"console{os.getpid()}", f"127.0.0.1:{free_port()}"
-    robot = [sys.executable, "-m", "lira.tools.bench.parts.null_robot", name, endpoint]
-    with ChildProcess("the robot", robot, tmp_path / "lira.robot.log") as server:
-        server.wait_ready(null_robot.READY, 30.0)
-        yield name, endpoint
-
-
 def drive_for(reader, duration_s=2.0):
     """What was applied meanwhile, and the times between two commands as the robot took them."""
     reader.poll()
@@ -247,7 +238,7 @@ def drive_for(reader, duration_s=2.0):
 
 def test_a_console_that_is_slow_stopped_or_killed_changes_nothing_in_control(tmp_path):
     with contextlib.ExitStack() as stack:
-        name, endpoint = stack.enter_context(null_robot_on_the_bus(tmp_path))
+        name, endpoint, _ = stack.enter_context(null_robot_at_work())
         bus = Bus(name, connect=endpoint)
         stack.callback(bus.close)
         reader = bus.reader(APPLIED, depth=512)
@@ -282,9 +273,9 @@ def test_a_console_that_is_slow_stopped_or_killed_changes_nothing_in_control(tmp
         assert max(gaps) < 0.25
 
 
-def test_the_keys_ask_and_say_that_nobody_answers(tmp_path):
+def test_the_keys_ask_and_say_that_nobody_answers():
     with contextlib.ExitStack() as stack:
-        name, endpoint = stack.enter_context(null_robot_on_the_bus(tmp_path))
+        name, endpoint, _ = stack.enter_context(null_robot_at_work())
         bus, watch = Bus(name, connect=endpoint), Bus(name, connect=endpoint, watch=True)
         stack.callback(bus.close)
         stack.callback(watch.close)
@@ -315,12 +306,9 @@ def test_the_keys_ask_and_say_that_nobody_answers(tmp_path):
         press("r", lambda: heard[2:] == [OperatorRequest(Request.RESET)])
 
 
-def test_the_keyboard_drives_locks_without_the_focus_and_comes_back(tmp_path):
-    name, endpoint = f"keys{os.getpid()}", f"127.0.0.1:{free_port()}"
-    robot = [sys.executable, "-m", "lira.tools.bench.parts.null_robot", name, endpoint]
+def test_the_keyboard_drives_locks_without_the_focus_and_comes_back():
     with contextlib.ExitStack() as stack:
-        server = stack.enter_context(ChildProcess("the robot", robot, tmp_path / "lira.robot.log"))
-        server.wait_ready(null_robot.READY, 30.0)
+        name, endpoint, _ = stack.enter_context(null_robot_at_work())
         bus = Bus(name, connect=endpoint)
         stack.callback(bus.close)
         bus.ask(INFO)

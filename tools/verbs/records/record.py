@@ -16,7 +16,6 @@ import argparse
 import os
 import shlex
 import sys
-from datetime import datetime
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -26,6 +25,7 @@ if TYPE_CHECKING:
     from threading import Event
 
 NICENESS = 5
+RECORDINGS = Path("recordings")
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -61,17 +61,18 @@ def record(args: argparse.Namespace, stop: "Event") -> int:
     from lira.tools.cli import version
     from lira.tools.launch.lifetime import CLOSE_S
     from lira.tools.launch.notify import Notifier
-    from lira.tools.output.places import check_folder
+    from lira.tools.output.places import check_folder, own_folder
     from lira.tools.output.say import say
     from lira.tools.recording.beside import READY, new_folder
     from lira.tools.recording.recorder import Recorder, listen
     from lira.tools.recording.writer import RecordingWriter
 
-    folder = new_folder(args.run) if args.run else args.out or Path("recordings") / f"{datetime.now():%Y%m%d-%H%M%S}"
-    check_folder(folder)
+    given: Path | None = new_folder(args.run) if args.run else args.out
+    check_folder(given or RECORDINGS)
     notifier = Notifier.from_environment()
     with on_bus(args.connect, args.name, watch=True, close_s=CLOSE_S) as bus:
         head, tap, heard = listen(bus, version(), shlex.join(["lira", *sys.argv[1:]]), stop)
+        folder = given or own_folder(RECORDINGS)
         writer = RecordingWriter(folder, head, split_bytes=args.split * 2**20)
         os.nice(NICENESS)
         recorder = Recorder(tap, writer, head, say, most_bytes=args.memory * 2**20)

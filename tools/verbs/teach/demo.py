@@ -23,7 +23,6 @@ import shlex
 import sys
 import time
 from collections.abc import Sequence
-from datetime import datetime
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -78,6 +77,7 @@ def run(args: argparse.Namespace) -> int:
     from lira.tools.cli import require
     from lira.tools.launch.launch import direct, twin_words, wired
     from lira.tools.launch.processes import free_port, lira_command
+    from lira.tools.output.places import own_folder
 
     # What cannot work is refused before anything starts.
     world = args.world or ("lane" if args.wire else "line-obstacles")
@@ -94,7 +94,7 @@ def run(args: argparse.Namespace) -> int:
 
     for expert in args.expert:
         load_policy(expert, profile)
-    folder: Path = args.run or Path("runs") / f"demo-{datetime.now():%Y%m%d-%H%M%S}"
+    folder: Path = args.run or own_folder(Path("runs"), "demo-")
     port = free_port()
     name, endpoint = f"demo_{port}", f"127.0.0.1:{port}"
     both = ["--layout", str(args.layout), "--seed", str(args.seed)]
