@@ -5,6 +5,7 @@ import re
 import sys
 from collections import Counter
 from functools import cache
+from graphlib import TopologicalSorter
 from pathlib import Path
 
 import pytest
@@ -89,6 +90,10 @@ def modules(package: str) -> list[Path]:
     return sorted((ROOT / package).rglob("*.py"))
 
 
+def name_of(path: Path) -> str:
+    return ".".join(["lira", *path.relative_to(ROOT).with_suffix("").parts]).removesuffix(".__init__")
+
+
 def shown(path: Path) -> str:
     return str(path.relative_to(ROOT))
 
@@ -119,6 +124,15 @@ def test_rooms_import_only_those_below_them(package, room):
     for path in sorted(folder.rglob("*.py")) if folder.is_dir() else [single]:
         above = rooms(path, package) - ROOMS[package][room] - {room}
         assert not above, f"{shown(path)} imports {above}"
+
+
+def test_no_modules_import_each_other_in_a_circle():
+    files = {name_of(path): path for package in MAY_IMPORT for path in modules(package)}
+    graph = {
+        name: {each for each in imports(path) & files.keys() if not name.startswith(f"{each}.")}  # where it lies itself
+        for name, path in files.items()
+    }
+    TopologicalSorter(graph).prepare()  # raises CycleError, which names them
 
 
 @pytest.mark.parametrize("package", ROOMS)

@@ -9,9 +9,9 @@ from typing import Protocol
 
 from lira.hal.bus.bus import Bus
 from lira.hal.bus.services import press_estop, release_estop
-from lira.hal.errors import LiraError
 from lira.tools.launch.link_fault import LinkFaults, Relay
 from lira.tools.launch.processes import ChildProcess
+from lira.tools.stop_test.errors import StopTestError
 from lira.tools.stop_test.parts.intruder import Intruder
 
 LEASE_GONE_S = 1.2
@@ -22,10 +22,6 @@ RECORD_S, REPLAY_S = 1.0, 0.02
 RECORDED, LAST = 10, 5  # some twenty commands are under way in a second
 BURST_S = 0.1
 ENDED_S = 8.0
-
-
-class StopTestError(LiraError):
-    """What is under test did not do what has to come before a fault, or with it."""
 
 
 class Bench(Protocol):

@@ -14,7 +14,7 @@ from cryptography.hazmat.primitives.serialization import Encoding, load_pem_priv
 from lira.hal.bus.security.keys import CERTIFICATE, KEY
 from lira.tools.authority import AUTHORITY
 from lira.tools.launch.processes import lira_command
-from lira.tools.stop_test.acts import StopTestError
+from lira.tools.stop_test.errors import StopTestError
 from lira.tools.stop_test.setups import BRIEF, GUEST, LEAVER, RIVAL
 
 BRIEF_S, PATIENCE_S = 10.0, 20.0

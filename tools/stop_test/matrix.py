@@ -11,7 +11,7 @@ from itertools import count, groupby
 from pathlib import Path
 
 from lira.hal.errors import LiraError
-from lira.tools.stop_test.acts import StopTestError
+from lira.tools.stop_test.errors import StopTestError
 from lira.tools.stop_test.mutants import Mutant
 from lira.tools.stop_test.rows import Row
 from lira.tools.stop_test.setups import Setup, clock_library

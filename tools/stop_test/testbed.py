@@ -21,9 +21,9 @@ from lira.hal.messages import Episode, Source
 from lira.hal.profile import RobotProfile, load_profile
 from lira.tools.launch import link_fault as relay
 from lira.tools.launch.processes import ChildProcess, ProcessError, free_port
-from lira.tools.stop_test.acts import StopTestError
 from lira.tools.stop_test.commands import HAND, POLICY, ROBOT, WORLD, Commands
 from lira.tools.stop_test.control import ASK_TIME, TIME, tell
+from lira.tools.stop_test.errors import StopTestError
 from lira.tools.stop_test.journal import Journal, JournalReader
 from lira.tools.stop_test.mutants import Mutant
 from lira.tools.stop_test.parts import driver, hand, pulse, robot, ros2_world, world
