@@ -110,7 +110,7 @@ def _line_lidar() -> Curriculum:
         Drive(Episode(layout, lateral_m=lateral, yaw_rad=yaw), 60.0, "stay")
         for layout, (lateral, yaw) in enumerate(ASKEW * 3)
     )
-    return Curriculum("forest", STRAIGHT_ON, drives, laps=12)
+    return Curriculum("forest", STRAIGHT_ON, drives, laps=12, labels_per_step=10)
 
 
 def _passage() -> Curriculum:
@@ -174,7 +174,7 @@ def _table_top_depth() -> Curriculum:
 
 def _anew(course: Curriculum) -> Curriculum:
     """The same, each lap driven anew, where left and right are alike: an expert that is as good whatever its seed."""
-    return replace(course, proofs=PROOFS, mirrored=True, labels_per_step=10)
+    return replace(course, proofs=PROOFS, mirrored=True)
 
 
 CURRICULA = {
