@@ -15,11 +15,12 @@ from lira.tools.experiments.quality import WAYS, Way
 from lira.tools.experiments.trial import Trial
 
 ALL = "all"
+KERNEL = "kernel"  # plus, and every other method with its novice
 
 
 @dataclass(frozen=True, slots=True)
 class Selection:
-    """What is asked for. `methods` is a list with commas, "all", or None for the usual ones; `own` are a user's own.
+    """What is asked for. `methods` is a list with commas, "all", "kernel", or None for the usual ones; `own` a user's.
 
     `pairs` of experts replace the world's; `world`, `teacher`, `shift`, whether the world is `randomised` while it is
     taught, the cap of `laps`, `more` laps and `ways` of deployment go with experiments at equal quality.
@@ -77,6 +78,7 @@ class Selection:
     def elsewhere(self) -> str:
         """What to add to an experiment's name where it is not what it is by itself."""
         parts = (
+            KERNEL if self.methods == KERNEL else None,
             self.world and Path(self.world).stem,
             self.teacher,
             "randomised" if self.randomised else None,
@@ -138,6 +140,8 @@ def chosen_methods(words: str | None, experiment: Experiment, name: str) -> set[
         raise ConfigError(f"{name} takes no --methods", "It needs all of its methods together.")
     if words == ALL:
         return set(known)
+    if words == KERNEL:
+        return {each for each in known if each == "plus" or each.endswith("-kernel")}
     chosen = set(words.split(","))
     if not chosen <= set(known):
         raise ConfigError(f"{name} has no method '{min(chosen - set(known))}'", f"Known: {', '.join(known)}; or {ALL}.")

@@ -63,6 +63,13 @@ def test_every_method_is_taught_to_the_same_quality_and_shown_other_layouts_afte
     assert chosen_methods(None, load("unseen"), "unseen") == set(unseen.USUAL)
 
 
+def test_all_with_the_novice_of_plus_are_a_group_and_a_summary_of_their_own():
+    asked = Selection(1, methods="kernel")
+    names = {trial.method.name for trial in asked.trials(load("unseen"), "unseen")}
+    assert names == {"plus"} | {f"{name}-kernel" for name in ("hold", *(method.name for method in presets.RIVALS))}
+    assert asked.elsewhere == "-kernel"
+
+
 @pytest.mark.parametrize(("passed", "levels"), [(10, []), (11, [0.9]), (12, [0.9, 0.97])])
 def test_eleven_of_twelve_are_ninety_percent_and_all_are_ninety_seven(passed, levels):
     assert [level for level in LEVELS if point(1, 20, passed).reaches(level)] == levels
@@ -243,6 +250,13 @@ def test_results_lead_with_effort_and_quality_side_by_side(tmp_path):
     lead.draw(found, tmp_path)
     assert (tmp_path / lead.PICTURE).read_bytes().startswith(b"<?xml")
     assert f"]({lead.PICTURE})" in text
+
+
+def test_results_show_all_methods_with_the_novice_of_plus_beside_it():
+    main, elsewhere, _ = summaries(["plus"])
+    text = document.documents([main, msgspec.structs.replace(elsewhere, name="unseen-kernel")], {})["RESULTS.md"]
+    assert "## Rivals with the same novice" in text
+    assert "## Elsewhere" not in text
 
 
 def test_results_stay_short_with_every_method_and_say_when_nothing_was_played():

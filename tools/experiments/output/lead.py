@@ -13,7 +13,8 @@ from lira.tools.experiments.output.markdown import table
 from lira.tools.experiments.output.summary import Summary
 
 LED_BY = "unseen"
-ALL_WAYS, TAUGHT_ON = f"{LED_BY}-ask", f"{LED_BY}-more5"  # the same place, with more asked of fewer seeds
+# The same place, with more asked of fewer seeds.
+ALL_WAYS, TAUGHT_ON, RIVALS = f"{LED_BY}-ask", f"{LED_BY}-more5", f"{LED_BY}-kernel"
 PARTS = "ablation"
 FIRST = 6  # methods, of a table that is not the main one: the page is to stay short
 PICTURE = "docs/results/unseen-human_labels.svg"
@@ -51,6 +52,10 @@ MORE = """
 Novices as they were when they had been proven, and after five more laps of teaching, on the same layouts:
 `{command}`{played}
 """
+WITH_OUR_NOVICE = """
+Other methods with everything of `plus` but its method, its novice and its fresh layouts included, to 90 % as above:
+`{command}`{played}
+"""
 ELSEWHERE = """
 The same where the world, the teacher, or the robot is another one than so far; a shift is applied when the novice is
 tried, not while it is taught. What was played with an earlier version has the settings of that one.
@@ -63,7 +68,7 @@ def lead(summaries: Sequence[Summary]) -> str:
     main = found.get(LED_BY)
     if main is None:
         return HEAD + NOT_YET
-    here = (ALL_WAYS, TAUGHT_ON)
+    here = (ALL_WAYS, TAUGHT_ON, RIVALS)
     elsewhere = [each for name, each in found.items() if name.startswith(f"{LED_BY}-") and name not in here]
     played = f"{main.trials} trials{played_with(main)}"
     parts = [
@@ -80,6 +85,9 @@ def lead(summaries: Sequence[Summary]) -> str:
     if more := found.get(TAUGHT_ON):
         words = MORE.format(command=more.command, played=played_with(more))
         parts.append(f"\n## Taught on\n{words}\n" + table(taught_on(more)))
+    if rivals := found.get(RIVALS):
+        words = WITH_OUR_NOVICE.format(command=rivals.command, played=played_with(rivals))
+        parts.append(f"\n## Rivals with the same novice\n{words}\n" + table(effort(rivals)))
     if elsewhere:
         parts.append(f"\n## Elsewhere\n{ELSEWHERE}\n" + table([row for each in elsewhere for row in condition(each)]))
     if PARTS in found and found[PARTS].quality:

@@ -44,7 +44,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add(
         "--methods",
         metavar="NAMES",
-        help=f"of unseen, table2 and race, play these, separated by commas, or {ALL} (default: four)",
+        help=f"of unseen, table2 and race, play these, separated by commas; or {ALL}; or kernel, which is plus and all "
+        "others with its novice (default: four)",
     )
     add(
         "--method",
