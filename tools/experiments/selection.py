@@ -16,6 +16,15 @@ from lira.tools.experiments.trial import Trial
 
 ALL = "all"
 KERNEL = "kernel"  # plus, and every other method with its novice
+AT_EQUAL_QUALITY = {  # what is asked there alone, and the option that asks it
+    "world": "--world",
+    "teacher": "--teacher",
+    "shift": "--shift",
+    "randomised": "--randomise",
+    "laps": "--laps",
+    "more": "--more",
+    "ways": "--ways",
+}
 
 
 @dataclass(frozen=True, slots=True)
@@ -89,16 +98,18 @@ class Selection:
         return "".join(f"-{part}" for part in parts if part)
 
     def _elsewhere(self, trial: Trial, name: str) -> Trial:
-        asked = (self.world, self.teacher, self.shift, self.randomised, self.laps, self.more, self.ways)
-        if not any(asked):
+        asked = [option for asks, option in AT_EQUAL_QUALITY.items() if getattr(self, asks)]
+        if not asked:
             return trial
         if trial.quality is None:
-            what = f"{name} takes no --world, --teacher, --shift, --randomise, --laps, --more or --ways"
-            raise ConfigError(what, "They go with 'unseen' and other experiments at equal quality.")
+            raise ConfigError(
+                f"{name} takes no {' and no '.join(asked)}", "'unseen' and other experiments at equal quality do."
+            )
         teacher = self.teacher or trial.teacher
-        if teacher not in TEACHERS or (self.shift is not None and self.shift not in SHIFTS):
-            what = f"no teacher '{teacher}' or no shift '{self.shift}'"
-            raise ConfigError(what, f"Teachers: {', '.join(TEACHERS)}; shifts: {', '.join(SHIFTS)}.")
+        if teacher not in TEACHERS:
+            raise ConfigError(f"no teacher '{teacher}'", f"Teachers: {', '.join(TEACHERS)}.")
+        if self.shift is not None and self.shift not in SHIFTS:
+            raise ConfigError(f"no shift '{self.shift}'", f"Shifts: {', '.join(SHIFTS)}.")
         ways = tuple(self.ways) or trial.quality.ways
         if not set(ways) <= set(WAYS):
             raise ConfigError(f"no way of deployment '{min(set(ways) - set(WAYS))}'", f"Ways: {', '.join(WAYS)}.")
@@ -140,9 +151,10 @@ def chosen_methods(words: str | None, experiment: Experiment, name: str) -> set[
         raise ConfigError(f"{name} takes no --methods", "It needs all of its methods together.")
     if words == ALL:
         return set(known)
-    if words == KERNEL:
-        return {each for each in known if each == "plus" or each.endswith("-kernel")}
     chosen = set(words.split(","))
+    if KERNEL in chosen:
+        chosen = chosen - {KERNEL} | {each for each in known if each == "plus" or each.endswith("-kernel")}
     if not chosen <= set(known):
-        raise ConfigError(f"{name} has no method '{min(chosen - set(known))}'", f"Known: {', '.join(known)}; or {ALL}.")
+        remedy = f"Known: {', '.join(known)}; or {KERNEL}, or {ALL}."
+        raise ConfigError(f"{name} has no method '{min(chosen - set(known))}'", remedy)
     return chosen

@@ -68,6 +68,10 @@ def test_all_with_the_novice_of_plus_are_a_group_and_a_summary_of_their_own():
     names = {trial.method.name for trial in asked.trials(load("unseen"), "unseen")}
     assert names == {"plus"} | {f"{name}-kernel" for name in ("hold", *(method.name for method in presets.RIVALS))}
     assert asked.elsewhere == "-kernel"
+    assert chosen_methods("kernel,hg-dagger", load("unseen"), "unseen") == names | {"hg-dagger"}
+    with pytest.raises(ConfigError, match="has no method 'nobody'") as refused:
+        chosen_methods("kernel,nobody", load("unseen"), "unseen")
+    assert "kernel, or all" in refused.value.remedy
 
 
 @pytest.mark.parametrize(("passed", "levels"), [(10, []), (11, [0.9]), (12, [0.9, 0.97])])
@@ -194,8 +198,10 @@ def test_what_an_experiment_does_not_know_is_refused():
         Selection(1, world="race").trials(load("table2"), "table2")
     with pytest.raises(ConfigError, match="no way of deployment 'rope'"):
         Selection(1, ways=("rope",)).trials(load("unseen"), "unseen")  # type: ignore[arg-type]
-    with pytest.raises(ConfigError, match="no shift 'snow'"):
+    with pytest.raises(ConfigError, match=r"^no shift 'snow'"):
         Selection(1, shift="snow").trials(load("unseen"), "unseen")
+    with pytest.raises(ConfigError, match=r"^no teacher 'nobody'\. Teachers"):
+        Selection(1, teacher="nobody").trials(load("unseen"), "unseen")
 
 
 def test_the_cap_of_laps_is_stated_and_no_run_drives_layouts_of_another():
@@ -208,7 +214,7 @@ def test_the_cap_of_laps_is_stated_and_no_run_drives_layouts_of_another():
     for selection in (Selection(1, laps=most, more=1), Selection(1, more=most)):
         with pytest.raises(ConfigError, match="more are more than there are fresh layouts for"):
             selection.trials(load("unseen"), "unseen")
-    with pytest.raises(ConfigError, match="takes no --world, --teacher, --shift, --randomise, --laps"):
+    with pytest.raises(ConfigError, match=r"table2 takes no --laps\. "):
         Selection(1, laps=6).trials(load("table2"), "table2")
 
 
