@@ -88,6 +88,19 @@ def test_with_no_room_but_what_belongs_to_labels_it_ends_whole(tmp_path, monkeyp
     assert not recording.torn
 
 
+@pytest.mark.parametrize("free", [0, 1000, module.SPARE_BYTES])
+def test_a_disk_without_room_is_said_to_have_none_and_no_time_is_counted_backwards(tmp_path, monkeypatch, free):
+    said = []
+    monkeypatch.setattr(module, "free_bytes", lambda _: free)
+    tap = ATap([odom(1, 5.0)])
+    writer = RecordingWriter(tmp_path / "rec", HEAD, split_bytes=2**30)
+    recorder = Recorder(tap, writer, HEAD, said.append, most_bytes=2**30)
+    with pytest.raises(StorageError, match="no room is left for more, and the recording ends") as ended:
+        recorder.run(tap.over, [])
+    assert "what was recorded stays" in str(ended.value)
+    assert not said
+
+
 def test_a_disk_that_takes_nothing_more_ends_it_and_what_was_written_stays(tmp_path):
     class FullDisk(RecordingWriter):
         def flush(self):

@@ -130,7 +130,8 @@ class Recorder:
                 self._tell_losses()
                 if not self._has_room():
                     return StorageError(
-                        f"the recording ends: {self._writer.folder} has less than {SPARE_BYTES >> 20} MB left",
+                        f"no room is left for more, and the recording ends: {self._writer.folder} has less than "
+                        f"{SPARE_BYTES >> 20} MB left, which are kept for labels; what was recorded stays",
                         "Free some space, and start again.",
                     )
         self._tell_losses()
@@ -157,14 +158,16 @@ class Recorder:
         self._told = lost
 
     def _has_room(self) -> bool:
-        """Whether to go on; says so once when the room for it comes to an end."""
+        """Whether to go on; says so once when the room for it comes to an end, and how much time is in what is left."""
         free = free_bytes(self._writer.folder)
+        if free <= SPARE_BYTES:
+            return False
         rate = self._writer.size_bytes / max(time.monotonic() - self._began_s, 1.0)
         left_s = (free - SPARE_BYTES) / max(rate, 1.0)
         if not self._warned and left_s < WARN_S:
             self._warned = True
             self._say(f"the disk has {free / 2**30:.1f} GB left: room for {left_s / 60:.0f} min more of this")
-        return free > SPARE_BYTES
+        return True
 
 
 def attachment_of(sample: RawSample) -> Attachment | None:
