@@ -29,12 +29,28 @@ def choose(labels: Sequence[Demonstration], wanted: Wanted) -> list[int]:
 
     Raises `ConfigError` where that is none.
     """
+    found = last_intervention(labels) if wanted.nothing else fitting(labels, wanted)
     if wanted.numbers:
-        return sorted(set(wanted.numbers))
-    found = last_intervention(labels) if wanted.nothing else [n for n, each in enumerate(labels) if fits(each, wanted)]
+        return found
     if wanted.run is None:
         newest = max((labels[number].run for number in found), default=0)
         found = [number for number in found if labels[number].run == newest]
+    if not found:
+        raise ConfigError("no label is meant by that", "See which there are: lira labels list FILE")
+    return found
+
+
+def fitting(labels: Sequence[Demonstration], wanted: Wanted) -> list[int]:
+    """Numbers of the labels of all runs that are meant. Raises `ConfigError` where there is none, or said twice."""
+    if not wanted.numbers:
+        found = [number for number, each in enumerate(labels) if fits(each, wanted)]
+    elif wanted != Wanted(wanted.numbers):
+        raise ConfigError("labels are meant by number, or by source, time and run", "Give --number, or the others.")
+    else:
+        found = sorted(set(wanted.numbers))
+        if found[-1] >= len(labels):
+            wrong = next(number for number in found if number >= len(labels))
+            raise ConfigError(f"there is no label {wrong}", f"They go from 0 to {len(labels) - 1}.")
     if not found:
         raise ConfigError("no label is meant by that", "See which there are: lira labels list FILE")
     return found

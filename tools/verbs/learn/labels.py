@@ -7,6 +7,7 @@ and the damaged one stays beside it.
 
 examples:
   lira labels list runs/mine/labels.lira               all labels, with the numbers by which the others know them
+  lira labels list runs/mine --source human            ... those of the human alone
   lira labels undo runs/mine                           take back the last intervention; the folder will do
   lira labels undo FILE --number 12 40-43              ... these labels
   lira labels undo FILE --source camera --from 30 --to 35   ... what the camera expert showed in these seconds
@@ -45,11 +46,17 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     log = partial(in_run, name=LABELS)
     add("file", type=log, nargs="+", metavar="FILE", help="the log, or its run's folder; for merge two of them")
     add("--number", type=numbers, nargs="+", default=(), metavar="N", help="labels by number, like 12 or 40-43")
-    add("--source", help="undo, redo: labels of the human, or of an expert by name")
-    add("--from", type=float, dest="from_s", metavar="S", help="undo, redo: from this time of the robot's clock on")
-    add("--to", type=float, dest="to_s", metavar="S", help="undo, redo: up to this time")
+    add("--source", help="list, undo, redo: labels of the human, or of an expert by name")
+    add(
+        "--from",
+        type=float,
+        dest="from_s",
+        metavar="S",
+        help="list, undo, redo: from this time of the robot's clock on",
+    )
+    add("--to", type=float, dest="to_s", metavar="S", help="list, undo, redo: up to this time")
     add("--time", type=float, metavar="S", help="explain: the label that is nearest to this time")
-    add("--run", type=int, metavar="R", help="of this run in the log (default: the last that fits)")
+    add("--run", type=int, metavar="R", help="of this run in the log (default: the last that fits; list: all)")
     add("-o", "--output", type=Path, metavar="FILE", help="merge: the new log")
     add(
         "--repair", action="store_true", help="check: put a clean file in its place, and keep the damaged one beside it"
@@ -63,24 +70,33 @@ def run(args: argparse.Namespace) -> int:
     needed = 2 if args.what == "merge" else 1
     if len(args.file) != needed:
         raise ConfigError(f"{args.what} takes {needed} log{'s' * (needed > 1)}", "See: lira labels --help")
+    given = [option for name, option in OPTIONS.items() if getattr(args, name) not in (None, (), False)]
+    useless = [option for option in given if option not in TAKES[args.what]]
+    if useless:
+        can = f"It takes {', '.join(TAKES[args.what])}" if TAKES[args.what] else "Leave it out"
+        raise ConfigError(f"{args.what} does nothing with {', '.join(useless)}", f"{can}; see: lira labels --help")
     return DOES[args.what](args)
 
 
 def list_labels(args: argparse.Namespace) -> int:
-    """Show all labels."""
+    """Show all labels, or those that are meant."""
     from lira.fusion.log.label_edit import read_heads
     from lira.hal.errors import LiraError
+    from lira.tools.labels.choose import fitting
     from lira.tools.labels.relearn import contradictions, relearn
     from lira.tools.labels.words import list_rows, list_table
 
     path = args.file[0]
     labels = read_heads(path)
+    wanted = wanted_of(args)
+    shown = range(len(labels)) if wanted.nothing else set(fitting(labels, wanted))
     try:
         aside = contradictions(*relearn(path))
     except LiraError:
         aside = {}  # no novice is there that could tell
-    rows = list_rows(labels, aside)
+    rows = [row for number, row in enumerate(list_rows(labels, aside)) if number in shown]
     head = f"{len(labels)} labels given, {sum(label.stored for label in labels)} of them learned"
+    head += "" if wanted.nothing else f"; here {len(rows)} of them"
     return tell(args, {"file": str(path), "labels": rows}, f"{head}\n\n{list_table(rows)}")
 
 
@@ -120,6 +136,8 @@ def explain(args: argparse.Namespace) -> int:
     labels = read_heads(path)
     if (args.time is None) is (not args.number):
         raise ConfigError("explain needs one label", "Give its --number, or a --time near it.")
+    if args.number and args.run is not None:
+        raise ConfigError("a number says by itself of which run a label is", "Give --run with --time only.")
     at = one_of(labels, wanted_of(args).numbers) if args.number else nearest(labels, args.time, args.run)
     novice, learned = relearn(path)
     label = labels[at]
@@ -175,6 +193,28 @@ DOES: dict[str, Callable[[argparse.Namespace], int]] = {
     "explain": explain,
     "merge": merge,
     "check": check,
+}
+
+# What an argument is called, and who does something with it; --json is for all.
+OPTIONS = {
+    "number": "--number",
+    "source": "--source",
+    "from_s": "--from",
+    "to_s": "--to",
+    "time": "--time",
+    "run": "--run",
+    "output": "-o",
+    "repair": "--repair",
+    "profile": "--profile",
+}
+WHICH = ("--number", "--source", "--from", "--to", "--run")
+TAKES: dict[str, tuple[str, ...]] = {
+    "list": WHICH,
+    "undo": WHICH,
+    "redo": WHICH,
+    "explain": ("--number", "--time", "--run"),
+    "merge": ("-o",),
+    "check": ("--repair", "--profile"),
 }
 
 

@@ -75,6 +75,25 @@ def test_the_list_says_what_became_of_each_label(folder, capsys):
     assert [number for number, line in enumerate(lines) if line.endswith("contradicts the rest")] == [6]
 
 
+@pytest.mark.parametrize(
+    ("words", "numbers"),
+    [
+        (["--source", "human"], [4, 5, 7, 8, 9]),
+        (["--source", "camera", "--from", "0.6"], [3, 6]),
+        (["--to", "0.2"], [0, 1]),
+        (["--number", "2", "5-6"], [2, 5, 6]),
+        (["--run", "0"], list(range(10))),
+    ],
+)
+def test_the_list_is_of_the_labels_that_are_meant(folder, capsys, words, numbers):
+    status, said = lira(capsys, "list", folder, *words, "--json", "-")
+    assert status == 0
+    assert [row["number"] for row in json.loads(said.out)["labels"]] == numbers
+    said = lira(capsys, "list", folder, *words)[1].out
+    assert f"here {len(numbers)} of them" in said
+    assert [int(line.split()[0]) for line in said.splitlines()[-len(numbers) :]] == numbers
+
+
 def test_the_last_intervention_is_taken_back_and_the_novice_knows_it_no_more(folder, capsys):
     before = turn(folder, 0)
     status, said = lira(capsys, "undo", folder / LABELS)
@@ -152,6 +171,20 @@ def test_two_logs_become_one(folder, capsys, tmp_path):
         ["merge", "LOG", "-o", "x"],
         ["merge", "LOG", "LOG"],
         ["list", "NONE"],
+        ["list", "LOG", "--source", "nobody"],
+        ["list", "LOG", "--number", "10"],
+        ["list", "LOG", "--time", "3"],
+        ["list", "LOG", "--repair"],
+        ["undo", "LOG", "--time", "3"],
+        ["undo", "LOG", "--number", "1", "--source", "human"],
+        ["redo", "LOG", "--number", "1", "--run", "0"],
+        ["redo", "LOG", "-o", "x"],
+        ["explain", "LOG", "--number", "1", "--source", "human"],
+        ["explain", "LOG", "--number", "1", "--run", "7"],
+        ["explain", "LOG", "--time", "1", "--to", "2"],
+        ["merge", "LOG", "LOG", "-o", "x", "--number", "1"],
+        ["check", "LOG", "--number", "1"],
+        ["check", "LOG", "--source", "human"],
     ],
 )
 def test_what_makes_no_sense_changes_nothing_and_says_why(folder, capsys, words):
