@@ -5,11 +5,17 @@ from typing import Any
 
 from lira.fusion.learning.learned_policy import Contradiction, Part
 from lira.fusion.log.label_file import Demonstration
+from lira.tools.labels.numbers import ranges
 from lira.tools.output.table import format_table
 
 LISTED = ("number", "run", "lap", "time", "source", "speed, turn", "novice's", "")
 EXPLAINED = ("number", "run", "lap", "time", "source", "says speed, turn", "likeness", "adds to speed", "adds to turn")
 SHOWN = 10
+UNCHANGED = {  # a label by its state: why it is not taken back, or not learned again
+    "learned": "learned already, it is not taken back",
+    "taken back": "taken back already",
+    "redundant or objected to": "redundant or objected to, so never learned, and not taken back either",
+}
 
 
 def state(label: Demonstration, aside: Contradiction | None) -> str:
@@ -21,6 +27,15 @@ def state(label: Demonstration, aside: Contradiction | None) -> str:
     if aside is None:
         return "learned"
     return "learned; its mirror image contradicts the rest" if aside.mirrored else "contradicts the rest"
+
+
+def unchanged(labels: Sequence[Demonstration], numbers: Sequence[int]) -> list[str]:
+    """Why nothing changed with some labels that were meant, a line for each reason."""
+    lines = []
+    for which, why in UNCHANGED.items():
+        same = [number for number in numbers if state(labels[number], None) == which]
+        lines += [f"nothing changed with {ranges(same)}: {why}"] if same else []
+    return lines
 
 
 def pair(action: tuple[float, float]) -> str:

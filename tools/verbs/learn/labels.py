@@ -106,6 +106,7 @@ def undo(args: argparse.Namespace) -> int:
     from lira.tools.labels.choose import choose
     from lira.tools.labels.numbers import ranges
     from lira.tools.labels.relearn import rewrite
+    from lira.tools.labels.words import unchanged
 
     path, again = args.file[0], args.what == "redo"
     labels = read_heads(path)
@@ -116,6 +117,9 @@ def undo(args: argparse.Namespace) -> int:
     numbers = [number for number in found if (labels[number].undone if again else labels[number].stored)]
     what = "learned again" if again else "taken back"
     lines = [f"{what}: {len(changed)} label{'s' * (len(changed) != 1)} {ranges(numbers)}".rstrip()]
+    if not found:
+        lines.append("no label of this log is taken back")
+    lines += unchanged(labels, [number for number in found if number not in set(numbers)])
     if changed:
         lines.append(rewrite(path))
     if changed and not again:

@@ -1,6 +1,7 @@
 """`lira labels list|undo|redo|explain|merge` on what a run leaves in its folder."""
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -149,6 +150,31 @@ def test_what_became_of_a_label_is_told_alike_by_list_and_explain_whatever_was_u
     assert told(6) == "contradicts the rest"
     lira(capsys, "undo", folder / LABELS, "--number", "0-3", "7-9")  # nobody is left whom it could contradict
     assert told(6) == "learned"
+
+
+@pytest.mark.parametrize(
+    ("words", "why"),
+    [
+        (["redo", "--number", "4"], "nothing changed with 4: learned already"),
+        (["redo", "--number", "1", "4"], "nothing changed with 4: learned already"),
+        (["redo", "--number", "10"], "nothing changed with 10: redundant or objected to"),
+        (["undo", "--number", "1-2"], "nothing changed with 1: taken back already"),
+        (["undo", "--number", "10"], "nothing changed with 10: redundant or objected to"),
+        (["redo"], "learned again: 1 label 1"),
+    ],
+)
+def test_a_label_with_which_nothing_changes_is_named_and_why(folder, capsys, words, why):
+    with DemonstrationLog(folder / LABELS, SIM, mirrored=True) as log:
+        log.append(replace(next(labels()), stored=False))
+    lira(capsys, "undo", folder, "--number", "1")
+    status, said = lira(capsys, words[0], folder, *words[1:])
+    assert status == 0
+    assert why in said.out
+
+
+def test_to_learn_again_what_nobody_took_back_says_so(folder, capsys):
+    status, said = lira(capsys, "redo", folder)
+    assert (status, said.out.splitlines()) == (0, ["learned again: 0 labels", "no label of this log is taken back"])
 
 
 def test_two_logs_become_one(folder, capsys, tmp_path):
