@@ -6,6 +6,7 @@ import cv2
 import numpy as np
 import pytest
 from recorded_run import write_reports
+from wiring import PROFILE, served
 
 from lira.hal.messages import (
     Applied,
@@ -17,6 +18,7 @@ from lira.hal.messages import (
     Source,
     Twist,
 )
+from lira.hal.testing import NullRobot
 from lira.tools.cli import main
 
 STOPS_S = 5.0
@@ -109,3 +111,10 @@ def test_a_robot_that_never_stopped_and_nobody_who_was_called_are_said(plus, tmp
 def test_now_has_no_times(capsys):
     assert main(["explain", "--last-stop"]) == 2
     assert "times and labels are those of a recording" in capsys.readouterr().err
+
+
+def test_a_robot_in_lockstep_that_nobody_drives_waits_for_a_driver_and_is_not_out_of_reach(capsys):
+    with served(NullRobot(PROFILE), lockstep=True) as robot:
+        out = explained(capsys, "--connect", robot.endpoint, "--name", robot.name)
+    assert "WAITS FOR A DRIVER: It is in lockstep" in out
+    assert "senses    nothing" not in out

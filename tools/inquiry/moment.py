@@ -94,6 +94,7 @@ class Moment:
             answer_age_s=self.age_s(OPERATOR_ANSWER),
             estop=applied is not None and applied.reason is Reason.ESTOP,
             confirmed=True,
+            lockstep=self.head.lockstep,
             fov_rad=features.fov_rad,
             max_range_m=features.max_range_m,
         )
@@ -135,7 +136,10 @@ def moment_now(bus: Bus, head: Head, heard_s: float) -> Moment:
         for raw in tap.poll():
             found.append(Recorded(raw.key, raw.ros_type, raw.payload, raw.attachment, now_ns, now_ns, head))
         time.sleep(0.01)
-    moment = gather(head, found, head.to_robot_s(time.time_ns()))
+    # Time in lockstep is not that of any clock here: it is now what it was when the robot spoke last.
+    spoken_s = [each.sent_s for each in found if each.attachment is not None][-1:]
+    now_s = spoken_s[0] if head.lockstep and spoken_s else head.to_robot_s(time.time_ns())
+    moment = gather(head, found, now_s)
     moment.live = True
     _learn_of(moment, _calls(each for each in found if each.key == METHOD.key))
     return moment

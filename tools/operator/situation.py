@@ -5,7 +5,7 @@ The first of these rules that holds decides: who must act comes before who drive
 | what is so | situation |
 |---|---|
 | the emergency stop is pressed | estop, estop_confirmed |
-| nothing is heard of the robot | no_link |
+| nothing is heard of the wheels | no_link; of a robot in lockstep, which is there: lockstep |
 | the dead-man is held | person; slowly: person_slow; paused: person_paused |
 | a request paused it | paused |
 | a session is at a stage that is the person's | practice, ready, judging, verdict, passed |
@@ -32,6 +32,7 @@ class Situation(StrEnum):
     ESTOP = "estop"
     ESTOP_CONFIRMED = "estop_confirmed"
     NO_LINK = "no_link"
+    LOCKSTEP = "lockstep"
     PERSON = "person"
     PERSON_SLOW = "person_slow"
     PERSON_PAUSED = "person_paused"
@@ -88,7 +89,7 @@ URGENCY: dict[Situation, Urgency] = {
     **dict.fromkeys((_S.COLLIDED, _S.STRAYED, _S.WAITS, _S.OBSTACLE, _S.UNKNOWN, _S.SHIELD_STANDS), Urgency.NEED),
     **dict.fromkeys((_S.DISAGREE, _S.VERDICT, _S.PASSED, _S.READY), Urgency.ASK),
     **dict.fromkeys((_S.ONE_EXPERT, _S.SHIELD, _S.JUDGING), Urgency.WATCH),
-    **dict.fromkeys((_S.PAUSED, _S.FINISHED, _S.NO_COMMAND, _S.TOLD_TO_STAND, _S.PRACTICE), Urgency.IDLE),
+    **dict.fromkeys((_S.PAUSED, _S.FINISHED, _S.NO_COMMAND, _S.TOLD_TO_STAND, _S.PRACTICE, _S.LOCKSTEP), Urgency.IDLE),
 }
 
 STANDING: dict[Reason, Situation] = {
@@ -119,7 +120,7 @@ def situation_of(view: View) -> Situation:
         return _S.ESTOP_CONFIRMED if view.confirmed else _S.ESTOP
     applied = view.applied
     if applied is None or not view.linked:
-        return _S.NO_LINK
+        return _S.LOCKSTEP if view.lockstep else _S.NO_LINK
     if applied.source is Source.TELEOP:
         return _by_hand(view)
     if view.paused:

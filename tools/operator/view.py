@@ -29,6 +29,7 @@ class View:
     who looks is (`deadman.State`), None without one.
     `answer` is whoever's who drives and learns, repeated by them, and `verdict_age_s` how long ago it was a new one;
     `unanswered` is a request of who looks that nobody answered.
+    `lockstep`: it is there, and its time stands until whoever drives has answered.
     `confirmed`: the robot has answered that the emergency stop holds which was pressed here.
     """
 
@@ -54,6 +55,7 @@ class View:
     estop: bool = False
     confirmed: bool = False
     hand: str | None = None
+    lockstep: bool = False
     fov_rad: float = 2.269
     max_range_m: float = 4.0
 
