@@ -19,7 +19,7 @@ from lira.tools.live.classroom import Classroom
 from lira.tools.live.lap_driver import LapDriver
 from lira.tools.live.rules import Rules
 from lira.tools.live.session import LiveSession
-from lira.tools.operator.voice import explain
+from lira.tools.operator.listen import explaining
 from lira.tools.recording.beside import recorder_beside
 from lira.tools.runs.course import Course
 from lira.tools.runs.folder import in_the_log
@@ -58,7 +58,7 @@ def sit(args: argparse.Namespace, plan: Plan, robot: RemoteRobot, rules: Rules, 
         board = Board(
             rules.person, room.before, journal.ledger, robot.now, lambda state: sessions.put(state, robot.now()), say
         )
-        driver = LapDriver(robot, arena, loop, room, journal, hand, rules, board, say, explain)
+        driver = LapDriver(robot, arena, loop, room, journal, hand, rules, board, say, explaining(robot.bus))
         session = LiveSession(driver, course, room, journal, rules, say)
         stack.enter_context(saving(room.snapshot, say))
         driver.stop = stack.enter_context(stop_or_interrupt())

@@ -2,15 +2,17 @@
 
 import math
 import time
+from collections.abc import Callable
 from dataclasses import replace
 from typing import TypeVar
 
 from lira.hal.bus.bus import Bus
 from lira.hal.bus.reader import Received
 from lira.hal.bus.topics import APPLIED, BATTERY, CAMERA, DECISION, ODOM, OPERATOR_ANSWER, SCAN, SESSION, SIM_STATE
-from lira.hal.messages import Reason
+from lira.hal.messages import Applied, Reason
 from lira.hal.profile import RobotProfile
 from lira.tools.operator.view import View
+from lira.tools.operator.voice import explain
 
 M = TypeVar("M")
 
@@ -61,6 +63,18 @@ class Ears:
             verdict_age_s=now_s - self._verdict_s,
             estop=applied is not None and applied.message.reason is Reason.ESTOP,
         )
+
+
+def explaining(bus: Bus) -> Callable[[Applied], str]:
+    """What puts into words why the robot stands for whoever drives on a bus, or that somebody else drives it."""
+    wheels = bus.reader(APPLIED)
+
+    def explained(applied: Applied) -> str:
+        newest = wheels.newest()
+        fresh = newest is not None and time.monotonic() - newest.arrived_s <= APPLIED.max_age_s
+        return explain(applied, _message(newest) if fresh else None)
+
+    return explained
 
 
 def _message(received: Received[M] | None) -> M | None:

@@ -6,6 +6,7 @@ The first of these rules that holds decides: who must act comes before who drive
 |---|---|
 | the emergency stop is pressed | estop, estop_confirmed |
 | nothing is heard of the wheels | no_link; of a robot in lockstep, which is there: lockstep |
+| commands from here are refused, and somebody else drives | other |
 | the dead-man is held | person; slowly: person_slow; paused: person_paused |
 | a request paused it | paused |
 | a session is at a stage that is the person's | practice, ready, judging, verdict, passed |
@@ -33,6 +34,7 @@ class Situation(StrEnum):
     ESTOP_CONFIRMED = "estop_confirmed"
     NO_LINK = "no_link"
     LOCKSTEP = "lockstep"
+    OTHER = "other"
     PERSON = "person"
     PERSON_SLOW = "person_slow"
     PERSON_PAUSED = "person_paused"
@@ -88,7 +90,7 @@ URGENCY: dict[Situation, Urgency] = {
     **dict.fromkeys((_S.STALE, _S.NEUTRAL_FIRST, _S.NEUTRAL_HELD, _S.REFUSED, _S.DEVICE_LOST), Urgency.NEED),
     **dict.fromkeys((_S.COLLIDED, _S.STRAYED, _S.WAITS, _S.OBSTACLE, _S.UNKNOWN, _S.SHIELD_STANDS), Urgency.NEED),
     **dict.fromkeys((_S.DISAGREE, _S.VERDICT, _S.PASSED, _S.READY), Urgency.ASK),
-    **dict.fromkeys((_S.ONE_EXPERT, _S.SHIELD, _S.JUDGING), Urgency.WATCH),
+    **dict.fromkeys((_S.ONE_EXPERT, _S.SHIELD, _S.JUDGING, _S.OTHER), Urgency.WATCH),
     **dict.fromkeys((_S.PAUSED, _S.FINISHED, _S.NO_COMMAND, _S.TOLD_TO_STAND, _S.PRACTICE, _S.LOCKSTEP), Urgency.IDLE),
 }
 
@@ -121,6 +123,8 @@ def situation_of(view: View) -> Situation:
     applied = view.applied
     if applied is None or not view.linked:
         return _S.LOCKSTEP if view.lockstep else _S.NO_LINK
+    if view.other:
+        return _S.OTHER
     if applied.source is Source.TELEOP:
         return _by_hand(view)
     if view.paused:

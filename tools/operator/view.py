@@ -30,6 +30,7 @@ class View:
     `answer` is whoever's who drives and learns, repeated by them, and `verdict_age_s` how long ago it was a new one;
     `unanswered` is a request of who looks that nobody answered.
     `lockstep`: it is there, and its time stands until whoever drives has answered.
+    `other`: commands of who looks are refused, and somebody else drives.
     `confirmed`: the robot has answered that the emergency stop holds which was pressed here.
     """
 
@@ -56,6 +57,7 @@ class View:
     confirmed: bool = False
     hand: str | None = None
     lockstep: bool = False
+    other: bool = False
     fov_rad: float = 2.269
     max_range_m: float = 4.0
 

@@ -8,11 +8,12 @@ from pathlib import Path
 import msgspec
 
 from lira.hal.errors import ConfigError
-from lira.hal.messages import Applied, SessionState, Source
+from lira.hal.messages import Applied, Reason, SessionState, Source
 from lira.tools.operator.situation import URGENCY, Situation, Urgency, lost_devices, situation_of, standing_of
 from lira.tools.operator.view import View
 
 ENGLISH = "en"
+OBEYED = Source.POLICY, Reason.OK
 VERDICT_S = 10.0  # so long what became of a request is news
 
 
@@ -46,8 +47,14 @@ def speak(view: View, language: str = ENGLISH) -> Voice:
     return Voice(situation, URGENCY[situation], words.who.format_map(facts), why, words.now.format_map(facts))
 
 
-def explain(applied: Applied) -> str:
-    """Why the robot stands, and what to do, in one line for a terminal."""
+def explain(applied: Applied, wheels: Applied | None = None) -> str:
+    """Why the robot stands, and what to do, in one line for a terminal.
+
+    `applied` is what became of a command from here. `wheels` is what they got last, from whomever, if that is known.
+    """
+    if applied.reason is Reason.REFUSED and wheels is not None and (wheels.source, wheels.reason) == OBEYED:
+        voice = speak(View("", applied=wheels, link_age_s=0.0, other=True))
+        return f"{voice.who}: {voice.why} {voice.now}"
     situation = standing_of(replace(applied, source=Source.NONE)) or Situation.TOLD_TO_STAND
     words, facts = vocabulary(ENGLISH)[situation], _facts(View("", applied=applied))
     return f"{words.who}: {words.why.format_map(facts)} {words.now}"

@@ -4,12 +4,14 @@ import string
 from dataclasses import replace
 
 import pytest
+from wiring import real_time_null, remote, served, wait_for
 
 from lira.hal.errors import ConfigError
 from lira.hal.messages import (
     STOP,
     Applied,
     BatteryState,
+    Command,
     CourseState,
     Decision,
     ExpertView,
@@ -23,6 +25,7 @@ from lira.hal.messages import (
     Twist,
 )
 from lira.tools.joystick.deadman import State
+from lira.tools.operator.listen import explaining
 from lira.tools.operator.situation import HAND_DRIVES, STANDING, URGENCY, Situation, Urgency, situation_of
 from lira.tools.operator.view import View, battery_share
 from lira.tools.operator.voice import explain, languages, speak, verdict, vocabulary
@@ -65,6 +68,7 @@ CASES = [
     (View("rosbot", lockstep=True), "lockstep"),
     (replace(VIEW, lockstep=True, link_age_s=3.0), "lockstep"),
     (replace(VIEW, lockstep=True), "one_expert"),
+    (replace(VIEW, other=True), "other"),
     (replace(VIEW, applied=BY_HAND), "person"),
     (replace(decided(human=(0.5, 0.0)), applied=BY_HAND), "person_slow"),
     (replace(decided(human=(1.0, 0.0)), applied=BY_HAND), "person"),
@@ -165,6 +169,31 @@ def test_a_terminal_is_told_why_the_robot_stands_and_what_to_do(reason):
     line = explain(Applied(STOP, 1.0, Source.NONE, reason))
     assert "\n" not in line
     assert len(line) > 30
+
+
+def test_a_terminal_whose_commands_are_refused_beside_another_driver_hears_who_drives_and_not_that_the_robot_stands():
+    refused = Applied(STOP, 1.0, reason=Reason.REFUSED)
+    line = explain(refused, replace(BY_POLICY, commander="anna"))
+    assert line.startswith("SOMEBODY ELSE DRIVES: anna: The robot does as another driver says")
+    assert "STANDS" not in line
+    for stands in (None, refused, replace(BY_POLICY, reason=Reason.STALE)):
+        line = explain(refused, stands)
+        assert "STANDS" in line
+        assert "or somebody else commands" in line
+
+
+def test_a_second_driver_is_told_that_another_drives():
+    with served(real_time_null()) as robot, remote(robot) as first, remote(robot) as second:
+        explained = explaining(second.bus)
+
+        def drives(driver, twist=BY_POLICY.twist):
+            return driver.drive(Command(twist, driver.now(), Source.POLICY, answers=1))
+
+        def is_told():
+            return drives(first).reason is Reason.OK and explained(drives(second)).startswith("SOMEBODY ELSE")
+
+        drives(first, STOP)
+        wait_for(is_told)
 
 
 def test_what_became_of_a_request_is_told_while_it_is_news():

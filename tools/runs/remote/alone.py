@@ -11,7 +11,7 @@ from lira.fusion.service import serve
 from lira.hal.client.remote import RemoteRobot
 from lira.tools.launch.lifetime import stop_or_interrupt
 from lira.tools.launch.notify import Notifier
-from lira.tools.operator.voice import explain
+from lira.tools.operator.listen import explaining
 from lira.tools.runs.course import Course, show_alone
 from lira.tools.runs.progress import Publish, Say, telling
 from lira.tools.runs.remote.reach import PAUSED, arena_of, request_line, restarter, world_of
@@ -23,13 +23,23 @@ def show(args: argparse.Namespace, robot: RemoteRobot, publish: Publish, say: Sa
         args.policy, robot.profile, args.experts or task_of(world_of(robot)), ask=args.ask, shield=args.shield
     )
     journal, loop, notifier = Journal(publish=publish), ControlLoop(robot), Notifier.from_environment()
+    explain = explaining(robot.bus)
     with stop_or_interrupt() as stop, request_line(robot, args) as line:
         service = OperatorService(line, loop, method, journal, say, restart=restarter(robot, args), paused=args.paused)
         service.begin()
         words = f"'{args.policy}' drives '{args.name}'; {PAUSED if args.paused else 'stop with Ctrl-C'}"
         say(words)
         notifier.ready(words)
-        serve(loop, method, journal, stop, say, operator_service=service, explain=explain, alive=notifier.alive)
+        serve(
+            loop,
+            method,
+            journal,
+            stop,
+            say,
+            operator_service=service,
+            explain=explain,
+            alive=notifier.alive,
+        )
     return 0
 
 

@@ -18,7 +18,7 @@ from lira.hal.client.remote import RemoteRobot
 from lira.tools.launch.lifetime import saving, stop_or_interrupt
 from lira.tools.launch.notify import Notifier
 from lira.tools.live.before import days_before
-from lira.tools.operator.voice import explain
+from lira.tools.operator.listen import explaining
 from lira.tools.recording.beside import recorder_beside
 from lira.tools.runs.folder import learn_again, snapshot
 from lira.tools.runs.names import LABELS, RECORD
@@ -94,7 +94,7 @@ def _lesson(
                 say,
                 lambda: novice.training_steps,
                 operator_service=service,
-                explain=explain,
+                explain=explaining(robot.bus),
                 layout=args.layout,
                 is_attended=lambda: hand.holds,
                 alive=notifier.alive,
