@@ -30,16 +30,7 @@ def show(args: argparse.Namespace, robot: RemoteRobot, publish: Publish, say: Sa
         words = f"'{args.policy}' drives '{args.name}'; {PAUSED if args.paused else 'stop with Ctrl-C'}"
         say(words)
         notifier.ready(words)
-        serve(
-            loop,
-            method,
-            journal,
-            stop,
-            say,
-            operator_service=service,
-            explain=explain,
-            alive=notifier.alive,
-        )
+        serve(loop, method, journal, stop, say, operator_service=service, explain=explain, alive=notifier.alive)
     return 0
 
 
