@@ -10,6 +10,7 @@ import numpy as np
 from lira.fusion.experts.tasks import DEFAULT, TASKS
 from lira.fusion.teaching.ride import Drive
 from lira.fusion.teaching.teacher import PERFECT, SKILLED, TeacherSettings
+from lira.hal.errors import ConfigError
 from lira.hal.messages import Episode
 
 
@@ -192,5 +193,12 @@ CURRICULA = {
 
 
 def curriculum(kind: str, task: str) -> Curriculum:
-    """Return what a task's expert is trained on; it may be another task's, see `Task`."""
-    return CURRICULA[TASKS[task].owner(kind)][kind]
+    """Return what a task's expert is trained on; it may be another task's, see `Task`.
+
+    Raises `ConfigError` for a sensor that the task has no expert for.
+    """
+    owner = TASKS[task].owner(kind)
+    if kind not in CURRICULA[owner]:
+        trained = " or ".join(f"--task {name}" for name, courses in CURRICULA.items() if kind in courses)
+        raise ConfigError(f"the task '{task}' has no {kind} expert", f"Train one with {trained}.")
+    return CURRICULA[owner][kind]

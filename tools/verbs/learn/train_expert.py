@@ -37,7 +37,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Train until it is proven, measure the cruise action, save."""
-    from lira.fusion.experts.files import shipped_path
+    from lira.fusion.experts.files import experts_of, shipped_path
+    from lira.fusion.teaching.curriculum import curriculum
     from lira.hal.profile import load_profile
     from lira.tools.runs.expert_training import command, train_expert
 
@@ -45,7 +46,12 @@ def run(args: argparse.Namespace) -> int:
     if owner != args.task:
         what = f"the task '{args.task}' has no {args.expert} expert of its own: it uses that of '{owner}'"
         raise ConfigError(what, f"Train that one with --task {owner}.")
+    curriculum(args.expert, args.task)
     profile = load_profile(args.profile or TASKS[args.task].profile)
+    if args.expert not in experts_of(profile):
+        inputs = " and ".join(profile.features.inputs)
+        what = f"a robot of the profile '{profile.name}' has no {args.expert} expert: it learns from {inputs}"
+        raise ConfigError(what, f"Leave --profile out for that of the task, '{TASKS[args.task].profile}'.")
     path = args.out or shipped_path(args.expert, profile, args.task)
     try:
         path.parent.mkdir(parents=True, exist_ok=True)

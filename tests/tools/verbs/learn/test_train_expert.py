@@ -2,10 +2,14 @@
 
 import pytest
 
+from lira.fusion.experts.files import EXPERTS, experts_of
+from lira.fusion.experts.tasks import TASKS
 from lira.fusion.inference.checkpoint import load_checkpoint
-from lira.fusion.teaching.curriculum import CURRICULA, STRICT, Curriculum
+from lira.fusion.teaching.curriculum import CURRICULA, STRICT, Curriculum, curriculum
 from lira.fusion.teaching.ride import Drive
+from lira.hal.errors import ConfigError
 from lira.hal.messages import Episode
+from lira.hal.profile import load_profile
 from lira.tools import cli
 
 
@@ -72,3 +76,29 @@ def test_a_task_that_borrows_its_lidar_expert_trains_none(capsys):
     what, remedy = capsys.readouterr().err.splitlines()
     assert "uses that of 'garden'" in what
     assert "--task garden" in remedy
+
+
+@pytest.mark.parametrize("words", [["depth"], ["depth", "--task", "line"], ["depth", "--task", "eight"]])
+def test_a_task_without_an_expert_of_that_sensor_names_those_that_have_one(words, capsys):
+    assert cli.main(["train-expert", *words]) == 2
+    assert capsys.readouterr().err.splitlines() == [
+        f"lira train-expert: the task '{words[-1] if words[1:] else 'line'}' has no depth expert",
+        "  Train one with --task table-top.",
+    ]
+
+
+@pytest.mark.parametrize("kind", EXPERTS)
+@pytest.mark.parametrize("task", TASKS.values(), ids=lambda task: task.name)
+def test_whatever_a_robot_of_a_task_learns_from_has_a_curriculum_and_nothing_else_has(task, kind):
+    if kind in experts_of(load_profile(task.profile)):
+        assert curriculum(kind, task.name) is CURRICULA[task.owner(kind)][kind]
+    else:
+        with pytest.raises(ConfigError, match=f"'{task.name}' has no {kind} expert"):
+            curriculum(kind, task.name)
+
+
+def test_a_profile_that_does_not_learn_from_that_sensor_trains_none(capsys):
+    assert cli.main(["train-expert", "depth", "--task", "table-top", "--profile", "thesis-sim"]) == 2
+    what, remedy = capsys.readouterr().err.splitlines()
+    assert "'thesis-sim' has no depth expert: it learns from " in what
+    assert "'thesis-sim-depth'" in remedy
