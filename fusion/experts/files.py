@@ -15,6 +15,7 @@ from lira.hal.profile import RobotProfile
 
 EXPERTS = tuple(row.sensor for row in MODALITIES.values())
 TRAINED = Path("runs") / "experts"
+SUFFIX = ".safetensors"
 
 
 def experts_of(profile: RobotProfile) -> tuple[str, ...]:
@@ -59,7 +60,7 @@ def shipped_path(name: str, profile: RobotProfile, task: str = DEFAULT) -> Path:
 
 def expert_path(name_or_path: str, profile: RobotProfile, pair: str = DEFAULT) -> Path:
     """Where an expert's checkpoint lies. Raises `ConfigError` for a name that does not exist for this robot or pair."""
-    if name_or_path.endswith(".safetensors"):
+    if name_or_path.endswith(SUFFIX):
         return Path(name_or_path)
     name = name_or_path.removesuffix("-expert")
     if name not in EXPERTS:

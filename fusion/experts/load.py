@@ -10,7 +10,7 @@ from typing import cast
 import numpy as np
 
 from lira.fusion.experts.files import EXPERTS as NAMES
-from lira.fusion.experts.files import check_pair, expert_path
+from lira.fusion.experts.files import SUFFIX, check_pair, expert_path
 from lira.fusion.experts.tasks import DEFAULT
 from lira.fusion.inference.checkpoint import Checkpoint, load_checkpoint
 from lira.fusion.inference.kernel_net import KernelNet
@@ -24,7 +24,6 @@ from lira.hal.messages import Action
 from lira.hal.plugins import EXPERTS
 from lira.hal.profile import RobotProfile
 
-SUFFIX = ".safetensors"
 SHIPPED = {f"{name}-expert": name for name in NAMES}
 
 

@@ -6,7 +6,7 @@ import time
 from pathlib import Path
 
 from lira.hal.config import write_whole
-from lira.hal.errors import DeviceError, StorageError
+from lira.hal.errors import ConfigError, DeviceError, StorageError
 from lira.tools.joystick.axes import PadState
 from lira.tools.joystick.device.finder import NONE_THERE
 from lira.tools.joystick.device.pad import Pad
@@ -19,7 +19,12 @@ LOOK_S = 0.1
 
 
 def learn(path: Path, device: str | None) -> int:
-    """Ask, and write the file. Raises `DeviceError` without a pad or an answer, `StorageError` for the file."""
+    """Ask, and write the file.
+
+    Raises `DeviceError` without a pad or an answer, `StorageError` or, for its name, `ConfigError` for the file.
+    """
+    if path.suffix != ".toml":  # by which `--pad` knows it
+        raise ConfigError(f"{path} is no .toml file", f"Name the pad's file {path.name or 'my-pad'}.toml.")
     if path.exists():
         raise StorageError(f"{path} is already there", "Choose another file name.")
     nodes = read_nodes()

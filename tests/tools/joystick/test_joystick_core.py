@@ -6,6 +6,7 @@ from lira.hal.errors import ConfigError
 from lira.hal.messages import JoyFeedback
 from lira.tools.joystick.axes import AxisRange, PadState, action_of, shape
 from lira.tools.joystick.freeze import GAPS, LONGEST_S, SHORTEST_S, FreezeWatch
+from lira.tools.joystick.pad_wizard import learn
 from lira.tools.joystick.pads.mapping import Mapping, known_pads, load_mapping
 from lira.tools.joystick.rumble import ATTENTION, ATTENTION_ID, FEEDBACK, FEEDBACK_ID, Rumble, pattern_of
 
@@ -146,3 +147,9 @@ def test_feedback_messages_become_patterns():
     assert pattern_of(JoyFeedback(kind, FEEDBACK_ID, 1.0)) == FEEDBACK
     assert pattern_of(JoyFeedback(kind, 0, 7.0))[0][0] == 1.0
     assert pattern_of(JoyFeedback(0, 0, 1.0)) == ()
+
+
+@pytest.mark.parametrize("name", ["mine", "mine.json"])
+def test_a_pads_file_that_no_bridge_would_know_by_its_name_is_refused_before_a_pad_is_looked_for(name, tmp_path):
+    with pytest.raises(ConfigError, match=rf"is no \.toml file.*{name}\.toml"):
+        learn(tmp_path / name, None)

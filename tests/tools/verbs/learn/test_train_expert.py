@@ -102,3 +102,13 @@ def test_a_profile_that_does_not_learn_from_that_sensor_trains_none(capsys):
     what, remedy = capsys.readouterr().err.splitlines()
     assert "'thesis-sim' has no depth expert: it learns from " in what
     assert "'thesis-sim-depth'" in remedy
+
+
+@pytest.mark.parametrize("name", ["mine", "mine.onnx"])
+def test_a_checkpoint_that_no_verb_would_know_by_its_name_is_refused_before_the_training(name, tmp_path, capsys):
+    path = tmp_path / "there" / name
+    assert cli.main(["train-expert", "camera", "--out", str(path)]) == 2
+    what, remedy = capsys.readouterr().err.splitlines()
+    assert what == f"lira train-expert: {path} is no .safetensors file"
+    assert remedy == f"  Name the checkpoint {name}.safetensors."
+    assert list(tmp_path.iterdir()) == []
