@@ -85,6 +85,33 @@ def test_a_name_that_can_be_no_module_is_refused(tmp_path, capsys, name):
     assert not (tmp_path / "there").exists()
 
 
+@pytest.mark.parametrize(
+    ("kind", "name"),
+    [
+        ("expert", "lidar"),
+        ("expert", "depth-expert"),
+        ("method", "plus"),
+        ("method", "hg-dagger"),
+        ("method", "hold-kernel"),
+        ("robot", "rosbot2"),
+        ("robot", "thesis-sim"),
+        ("world", "line"),
+        ("world", "table-top"),
+    ],
+)
+def test_a_name_of_the_projects_own_is_refused(tmp_path, capsys, kind, name):
+    assert main(["new", kind, name, "--into", str(tmp_path / "there")]) == 2
+    what, remedy = capsys.readouterr().err.splitlines()
+    assert what == f"lira new: there is a {kind} '{name}' already, which comes with the project"
+    assert f"such as my-{name}" in remedy
+    assert not (tmp_path / "there").exists()
+
+
+def test_another_kind_may_have_that_name(project):
+    for kind, name in (("world", "plus"), ("expert", "line"), ("sensor", "rosbot2")):
+        assert project(kind, name)[0].is_dir()
+
+
 def test_what_is_there_is_left_alone(project, tmp_path, capsys):
     folder, _ = project("world", "mine")
     (folder / "mine.toml").write_text("mine")

@@ -61,11 +61,17 @@ def run(args: argparse.Namespace) -> int:
 
 
 def write_project(kind: str, name: str, folder: Path) -> list[Path]:
-    """Write a project of this kind. Raises `ConfigError` for a bad name, `StorageError` if it cannot be written."""
+    """Write a project of this kind.
+
+    Raises `ConfigError` for a name that cannot be or is ours, `StorageError` if it cannot be written.
+    """
     about = KINDS[kind]
     words = {"kind": kind, "name": name, "package": package_of(name), "door": about.door, "part": about.part}
     words["title"] = "".join(part.capitalize() for part in words["package"].split("_"))
     words["thing"] = Template(about.thing).substitute(words)
+    if name in names_of_ours(kind):
+        remedy = f"Choose another, such as my-{name}: ours would be found in its place."
+        raise ConfigError(f"there is a {kind} '{name}' already, which comes with the project", remedy)
     if folder.exists():
         raise ConfigError(f"{folder} is there already", "Choose another name, or another folder with --into.")
     texts = {place(source, words["package"]): source.read_text(encoding="utf-8") for source in templates(kind)}
@@ -80,6 +86,27 @@ def write_project(kind: str, name: str, folder: Path) -> list[Path]:
     except OSError as error:
         raise StorageError(f"cannot write {folder}: {error.strerror}", "Choose another folder with --into.") from error
     return sorted(folder / path for path in project)
+
+
+def names_of_ours(kind: str) -> set[str]:
+    """Names by which what comes with the project is found, and what is brought along never is."""
+    if kind == "expert":
+        from lira.fusion.experts.files import EXPERTS
+
+        return {*EXPERTS, *(f"{name}-expert" for name in EXPERTS)}
+    if kind == "method":
+        from lira.fusion.methods.presets import ALIASES, METHODS
+
+        return {*METHODS, *ALIASES}
+    if kind == "robot":  # its profile has its name
+        from lira.hal.profile import known_profiles
+
+        return set(known_profiles())
+    if kind == "world":
+        from lira.sim_backend.catalogue import known_worlds
+
+        return set(known_worlds())
+    return set()
 
 
 def package_of(name: str) -> str:
