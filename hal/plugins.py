@@ -91,13 +91,25 @@ def _load(owner: str, target: str) -> object:
     if here not in sys.path:
         sys.path.append(here)
     module = _import(owner, place, attribute)
+    if hasattr(module, "__path__") and getattr(module, "__file__", None) is None:
+        raise _mere_folder(owner, place, attribute, Path(next(iter(module.__path__))))
     found: object = module
     for part in attribute.split("."):
         if not hasattr(found, part):
-            names = ", ".join(name for name in vars(module) if not name.startswith("_"))
+            names = ", ".join(name for name in vars(module) if not name.startswith("_")) or "nothing"
             raise ConfigError(f"{place} has no '{attribute}', which is to be the {owner}", f"It has: {names}.")
         found = getattr(found, part)
     return found
+
+
+def _mere_folder(owner: str, place: str, attribute: str, folder: Path) -> ConfigError:
+    """Say that what was found is a folder, which Python takes for a package without anything in it."""
+    here = Path.cwd()
+    shown = folder.relative_to(here) if folder.is_relative_to(here) else folder
+    modules = sorted(path.name for path in folder.glob("*.py"))
+    module = f"{folder.name}.py" if f"{folder.name}.py" in modules or not modules else modules[0]
+    remedy = f"Work in that folder, with {Path(module).stem}:{attribute}, or give {shown / module}:{attribute}."
+    return ConfigError(f"'{place}' is a folder and no module, and {owner} is to be in one", remedy)
 
 
 def _import(owner: str, place: str, attribute: str) -> ModuleType:

@@ -149,3 +149,30 @@ def test_a_file_that_failed_may_be_mended_and_loaded_again(lab):
         DOOR.find("again.py:x", SHIPPED)
     path.write_text("x = 10_000_000\n")
     assert DOOR.find("again.py:x", SHIPPED) == 10_000_000
+
+
+@pytest.mark.parametrize(("file", "module"), [("mylab_g/mylab_g.py", "mylab_g"), ("mylab_g/driver.py", "driver")])
+def test_a_folder_that_is_no_module_is_said_to_be_one_with_the_file_in_it(lab, file, module):
+    lab(file, "x = 1\n")
+    with pytest.raises(ConfigError, match=r"'mylab_g' is a folder and no module") as refused:
+        DOOR.find("mylab_g:x", SHIPPED)
+    assert refused.value.remedy == f"Work in that folder, with {module}:x, or give {file}:x."
+    assert DOOR.find(f"{file}:x", SHIPPED) == 1
+
+
+def test_a_folder_in_a_package_is_no_module_either(lab):
+    lab("mylab_h/__init__.py", "")
+    lab("mylab_h/deep/thing.py", "x = 1\n")
+    with pytest.raises(ConfigError, match=r"'mylab_h\.deep' is a folder.*mylab_h/deep/thing\.py:x"):
+        DOOR.find("mylab_h.deep:x", SHIPPED)
+    assert DOOR.find("mylab_h.deep.thing:x", SHIPPED) == 1
+
+
+def test_a_module_in_which_nothing_is_has_nothing(lab):
+    lab("mylab_i.py", "")
+    with pytest.raises(ConfigError, match=r"It has: nothing\."):
+        DOOR.find("mylab_i:x", SHIPPED)
+
+
+def test_a_module_that_comes_from_no_file_has_what_it_has(lab):
+    assert DOOR.find("sys:maxsize", SHIPPED) == sys.maxsize
