@@ -5,7 +5,9 @@ import ast
 import importlib
 import re
 import shlex
+import tokenize
 import tomllib
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -20,6 +22,14 @@ PACKAGES = ("hal", "robot", "sim_backend", "fusion", "tools")
 FOLDERS = (*PACKAGES, "tests", "docs", "examples", ".ci", ".github")
 PAGES = sorted([*DOCS.rglob("*.md"), *(ROOT / f"{name}.md" for name in ("README", "CONTRIBUTING", "SECURITY"))])
 PUBLIC = frozenset(lira.__all__)
+
+CODE = sorted(
+    path
+    for folder in (*PACKAGES, "tests", "examples")
+    for path in (ROOT / folder).rglob("*.*")
+    if path.suffix in (".py", ".toml")
+)
+OTHERS = {"docs/design.md"}  # rmw_zenoh's
 
 REAL_WHEELS = {"robot/core2/wheels.py", "tools/stop_test/journal.py:Wheels"}  # the robot's own
 
@@ -48,6 +58,18 @@ def named_files(text: str) -> set[str]:
     start = "|".join(re.escape(folder) for folder in FOLDERS)
     found = re.findall(rf"(?<![\w/.~-])((?:{start})/[\w./-]*\w)", text)
     return {name for name in found if (ROOT / name.split("/")[0]).exists()}
+
+
+def remarks(path: Path) -> Iterator[str]:
+    """The comments and docstrings of a Python file, the comments of a TOML file."""
+    if path.suffix == ".toml":
+        yield from re.findall(r"^ *#(.*)$", read(path), flags=re.MULTILINE)
+        return
+    with path.open(encoding="utf-8") as file:
+        yield from (token.string for token in tokenize.generate_tokens(file.readline) if token.type == tokenize.COMMENT)
+    for node in ast.walk(ast.parse(read(path))):
+        if isinstance(node, ast.Module | ast.ClassDef | ast.FunctionDef | ast.AsyncFunctionDef):
+            yield ast.get_docstring(node) or ""
 
 
 def blocks(page: Path, *languages: str) -> list[str]:
@@ -86,6 +108,17 @@ def test_links_lead_to_a_page_and_a_heading(page):
 @pytest.mark.parametrize("page", PAGES, ids=shown)
 def test_files_that_are_named_are_there(page):
     missing = {name for name in named_files(read(page)) if not (ROOT / name).exists()}
+    assert not missing
+
+
+def test_files_that_a_comment_or_a_docstring_names_are_there():
+    """By their place in the repository: `lira/` before it is that of an installation."""
+    missing = set()
+    for path in CODE:
+        text = "\n".join(remarks(path))
+        named = {name for name in named_files(text) - OTHERS if not (ROOT / name).exists()}
+        named |= set(re.findall(rf"(?<![\w/.~-])lira/(?:{'|'.join(PACKAGES)})/[\w./-]*", text))
+        missing |= {f"{shown(path)}: {name}" for name in named}
     assert not missing
 
 

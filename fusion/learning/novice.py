@@ -1,6 +1,6 @@
 """The novice Pi^N and its labels D^N: it acts and drops redundant labels; a network trains whenever m new are stored.
 
-The other novice there is learns from every label at once: `fusion/kernel_novice.py`.
+The other novice there is learns from every label at once: `fusion/learning/kernel_novice.py`.
 """
 
 import math

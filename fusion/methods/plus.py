@@ -7,7 +7,7 @@
 - Practice: a novice that was once examined drives as it will alone, and is only corrected.
 - Sureness: where the experts disagree and the novice says that it knows, it drives, and nobody is called.
 
-Its novice is that of `fusion/kernel.py`.
+Its novice is that of `fusion/learning/kernel_novice.py`.
 """
 
 from collections import deque

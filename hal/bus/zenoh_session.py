@@ -54,7 +54,8 @@ def open_session(
     """Open one; the arguments are those of `hal.bus.Bus`. With neither address it is connected to nobody.
 
     What is longer than its topic allows ends here: neither is it put together nor does it wait in a queue. Whoever
-    listens is a robot, and lets others do what `hal/access.py` says. Whoever connects hears the robot alone.
+    listens is a robot, and lets others do what `hal/bus/security/access.py` says. Whoever connects hears the robot
+    alone.
 
     Raises `BusError`: if it does not connect, after `CONNECT_MS` at the latest; `ConfigError`: to listen with keys that
     are no robot's.
