@@ -65,9 +65,11 @@ class Parser(argparse.ArgumentParser):
     """A parser that tells its errors as all are told, and does not keep to itself that its help cannot be written."""
 
     def error(self, message: str) -> NoReturn:
-        """Raise `ConfigError` for words that make no sense, with the option that may have been meant."""
+        """Raise `ConfigError` for words that make no sense, with the option or the choice that may have been meant."""
         unknown = re.search(r"unrecognized arguments: (-[^\s=]+)", message)
         meant = did_you_mean(unknown[1], re.findall(r"--[\w-]+", self.format_help()), LIKE) if unknown else ""
+        if chosen := re.search(r"invalid choice: '(.*)' \(choose from (.*)\)", message):
+            meant = did_you_mean(chosen[1], re.findall(r"[\w.-]+", chosen[2]))
         raise ConfigError(message, f"{meant} `{self.prog} --help` explains its words.".lstrip())
 
     def _print_message(self, message: str, file: "SupportsWrite[str] | None" = None) -> None:

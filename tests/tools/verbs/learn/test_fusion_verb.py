@@ -159,6 +159,11 @@ def test_an_address_or_a_name_that_is_none_is_refused(refused, words, named):
         (["demo", "--word=race"], "unrecognized arguments: --word=race", "Did you mean `--world`? "),
         (["twin", "--layout", "-1"], "argument --layout", ""),
         (["train-expert", "sonar"], "argument expert: invalid choice: 'sonar'", ""),
+        (["train-expert", "camra"], "argument expert: invalid choice: 'camra'", "Did you mean `camera`? "),
+        (["train-expert", "camera", "--task", "corider"], "argument --task: invalid", "Did you mean `corridor`? "),
+        (["bench", "latecy"], "argument NAME: invalid choice: 'latecy'", "Did you mean `latency`? "),
+        (["new", "methods", "x"], "argument kind: invalid choice: 'methods'", "Did you mean `method`? "),
+        (["keys", "enrol", "x"], "argument ACTION: invalid choice: 'enrol'", "Did you mean `enroll`? "),
         (["keys", "--nam", "x"], "argument ACTION: invalid choice", ""),
     ],
 )
