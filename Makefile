@@ -61,7 +61,7 @@ docs: setup ## the documentation, into site/; a warning fails it
 generated: setup ## what the documents take from the code: the map, the table of topics
 	$(BIN)/python docs/generate.py --write
 
-bench: setup ## all benchmarks, into runs/bench/; fails where a ratio in bench/history/ was far better
+bench: setup ## all benchmarks but decide, fuzz, record, soak and trial, into runs/bench/; fails where a ratio in bench/history/ was far better
 	@mkdir -p runs/bench
 	@failed=0; for name in $(BENCHES); do \
 	  $(BIN)/lira bench $$name --json runs/bench/$$name.json --history bench/history || failed=1; \

@@ -32,9 +32,9 @@ GROUPS = {
         "parity": "the same motions on two robots, and where they differ",
     },
     ("learn", "Learn"): {
-        "fusion": "the learner: reads sensors, decides, drives, trains (LIRA-SPF, HG-DAgger)",
+        "fusion": "the learner: reads sensors, decides, drives, trains, by any method",
         "drive": "let a novice or an expert drive, also on the robot itself",
-        "train-expert": "train the camera or the lidar expert",
+        "train-expert": "train an expert of one sensor: camera, lidar or depth",
         "experiment": "repeat an experiment of the thesis, with statistics",
         "labels": "a log of labels: list, undo, explain, merge, look for damage and repair it",
     },

@@ -1,5 +1,7 @@
 import json
+import re
 from importlib.util import find_spec
+from pathlib import Path
 
 from fresh import python
 
@@ -71,6 +73,16 @@ def test_a_processor_without_a_name_still_gets_one(tmp_path):
 
 def test_every_benchmark_has_its_module():
     assert all(find_spec(bench.module_of(name)) for name in bench.BENCHES)
+
+
+def test_make_says_which_benchmarks_it_leaves_out():
+    makefile = (Path(__file__).parents[3] / "Makefile").read_text()
+    made = re.search(r"^BENCHES := (.*)$", makefile, re.MULTILINE)[1].split()
+    said = re.search(r"^bench: .*## (.*)$", makefile, re.MULTILINE)[1]
+    assert set(made) < set(bench.BENCHES)
+    assert re.search(r"all benchmarks but ([\w, ]+?), into", said)[1].replace(" and ", ", ").split(", ") == sorted(
+        set(bench.BENCHES) - set(made)
+    )
 
 
 def test_an_unknown_bench_is_refused(capsys):

@@ -5,6 +5,8 @@ from types import SimpleNamespace
 import pytest
 from fresh import lira
 
+from lira.fusion.experts.files import EXPERTS
+from lira.fusion.methods.presets import METHODS
 from lira.hal.errors import ConfigError
 from lira.tools import cli
 from lira.tools.verbs import VERBS, Verb
@@ -37,6 +39,32 @@ def test_every_verb_explains_itself(verb, capsys):
         cli.main([verb, "--help"])
     assert end.value.code == 0
     assert f"usage: lira {verb}" in capsys.readouterr().out
+
+
+def test_the_help_of_what_makes_an_expert_or_drives_by_one_names_every_sensor(capsys):
+    assert all(sensor in VERBS["train-expert"].help for sensor in EXPERTS)
+    with pytest.raises(SystemExit):
+        cli.main(["drive", "--help"])
+    said = capsys.readouterr().out
+    assert all(f"{sensor}-expert" in said for sensor in EXPERTS)
+
+
+def test_the_help_of_the_learner_does_not_pass_a_few_methods_off_as_all():
+    assert "any method" in VERBS["fusion"].help
+    assert not any(method in VERBS["fusion"].help.lower() for method in METHODS)
+
+
+def test_the_help_of_record_names_every_verb_that_records_by_itself(capsys):
+    recorded = []
+    for verb in VERBS:
+        with pytest.raises(SystemExit):
+            cli.main([verb, "--help"])
+        recorded += [verb] if "--no-record" in capsys.readouterr().out else []
+    with pytest.raises(SystemExit):
+        cli.main(["record", "--help"])
+    said = capsys.readouterr().out
+    assert recorded
+    assert all(f"`lira {verb}`" in said for verb in recorded)
 
 
 def test_no_words_is_help(capsys):

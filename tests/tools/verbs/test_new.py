@@ -7,6 +7,7 @@ import tomllib
 
 import pytest
 
+from lira.fusion.preprocess import MODALITIES
 from lira.hal import plugins
 from lira.hal.plugins import Door
 from lira.tools.cli import main
@@ -110,6 +111,11 @@ def test_a_name_of_the_projects_own_is_refused(tmp_path, capsys, kind, name):
 def test_another_kind_may_have_that_name(project):
     for kind, name in (("world", "plus"), ("expert", "line"), ("sensor", "rosbot2")):
         assert project(kind, name)[0].is_dir()
+
+
+def test_a_new_sensor_is_told_all_that_a_robot_can_learn_from(project):
+    told = (project("sensor", "my-ranger")[0] / "README.md").read_text()
+    assert all(f"`{name}`" in told for name in (*MODALITIES, "inputs"))
 
 
 def test_what_is_there_is_left_alone(project, tmp_path, capsys):

@@ -26,7 +26,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add(
         "policy",
         metavar="POLICY",
-        help="a .safetensors file, camera-expert, lidar-expert, or your own MODULE:OBJECT",
+        help="a .safetensors file, camera-expert, lidar-expert, depth-expert, or your own MODULE:OBJECT",
     )
     add_client(parser)
     add_arena(parser)

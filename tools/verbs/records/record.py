@@ -1,8 +1,8 @@
 """Record everything on a robot's bus: sensors, who drives, decisions, what a person asks, as an MCAP recording.
 
-`lira fusion` and `lira demo` start one for each run. It hears what anybody may hear on the bus; commands go to the
-robot alone, so what reached the wheels is in `cmd_vel/applied`. ROS 2, Foxglove and Rerun open it as it is; for a robot
-far away it is best run on the robot itself, for the radio's sake.
+`lira fusion`, `lira teach` and `lira demo` start one for each run. It hears what anybody may hear on the bus; commands
+go to the robot alone, so what reached the wheels is in `cmd_vel/applied`. ROS 2, Foxglove and Rerun open it as it is;
+for a robot far away it is best run on the robot itself, for the radio's sake.
 
 examples:
   lira record                                       until Ctrl-C, into recordings/<date-time>
