@@ -11,7 +11,7 @@ from pathlib import Path
 from lira.fusion.experts.tasks import DEFAULT, TASKS
 from lira.fusion.preprocess import MODALITIES, modalities_of
 from lira.hal.errors import ConfigError
-from lira.hal.profile import RobotProfile
+from lira.hal.profile import RobotProfile, known_profiles, load_profile
 
 EXPERTS = tuple(row.sensor for row in MODALITIES.values())
 TRAINED = Path("runs") / "experts"
@@ -21,6 +21,22 @@ SUFFIX = ".safetensors"
 def experts_of(profile: RobotProfile) -> tuple[str, ...]:
     """Names of the experts that a robot has. Raises `ConfigError` for a profile with inputs that it does not have."""
     return tuple(row.sensor for row in modalities_of(profile))
+
+
+def check_learned(name: str, profile: RobotProfile) -> None:
+    """Raise `ConfigError` if a robot of this profile does not learn from the sensor of that expert."""
+    if name in experts_of(profile):
+        return
+    inputs = " and ".join(profile.features.inputs)
+    known = [f"'{other}'" for other in known_profiles() if name in experts_of(load_profile(other))]
+    what = f"a robot of the profile '{profile.name}' has no {name} expert: it learns from {inputs}"
+    raise ConfigError(what, f"Profiles of robots that have one: {', '.join(known)}.")
+
+
+def tasks_with(name: str) -> list[str]:
+    """Tasks that an expert is trained for: those of robots that learn from its sensor, unless they borrow it."""
+    own = [task for task in TASKS.values() if task.owner(name) == task.name]
+    return [task.name for task in own if name in experts_of(load_profile(task.profile))]
 
 
 def seeded(pair: str) -> tuple[str, int] | None:
@@ -70,12 +86,17 @@ def expert_path(name_or_path: str, profile: RobotProfile, pair: str = DEFAULT) -
     if pair not in TASKS:
         path = folder_of(pair) / f"{name}.safetensors"
         if not path.exists():
+            check_learned(name, profile)
             known = ", ".join(TASKS)
             what = f"there is no {name} expert {path}"
             raise ConfigError(what, f"Train one: {train} --out {path}; or name a task: {known}; or TASK@SEED.")
         return path
     path = shipped_path(name, profile, pair)
     if not path.exists():
+        check_learned(name, profile)
+        if TASKS[pair].owner(name) not in tasks_with(name):
+            remedy = f"Take that of another with {' or '.join(f'--experts {task}' for task in tasks_with(name))}."
+            raise ConfigError(f"the task '{pair}' has no {name} expert", remedy)
         words = "" if pair == DEFAULT else f" --task {pair}"
         where = "" if pair == DEFAULT else f" for the task '{pair}'"
         raise ConfigError(

@@ -94,6 +94,22 @@ def test_a_profile_without_an_expert_says_how_to_train_one():
         load_policy("camera-expert", REAL)
 
 
+@pytest.mark.parametrize("pair", ["line", "table-top", "line@1"])
+def test_an_expert_of_a_sensor_that_the_robot_does_not_learn_from_is_not_to_be_trained(pair):
+    with pytest.raises(
+        ConfigError, match=r"'thesis-sim' has no depth expert: it learns from image and scan"
+    ) as refused:
+        load_policy("depth-expert", SIM, pair)
+    assert "train-expert" not in refused.value.remedy
+    assert "thesis-sim-depth" in refused.value.remedy
+
+
+def test_a_task_without_an_expert_names_those_that_have_one_to_drive_by():
+    with pytest.raises(ConfigError, match=r"the task 'line' has no depth expert.*--experts table-top") as refused:
+        load_policy("depth-expert", load_profile("thesis-sim-depth"))
+    assert "train-expert" not in refused.value.remedy
+
+
 def test_a_file_of_ones_own_is_named_after_its_sensor(tmp_path):
     path = save(tmp_path / "mine.safetensors", lidar_net(130, seed=1), cruise=(0.9, 0.01))
     expert = load_policy(path, REAL)

@@ -37,7 +37,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Train until it is proven, measure the cruise action, save."""
-    from lira.fusion.experts.files import SUFFIX, experts_of, shipped_path
+    from lira.fusion.experts.files import SUFFIX, check_learned, shipped_path
     from lira.fusion.teaching.curriculum import curriculum
     from lira.hal.profile import load_profile
     from lira.tools.runs.expert_training import command, train_expert
@@ -48,10 +48,7 @@ def run(args: argparse.Namespace) -> int:
         raise ConfigError(what, f"Train that one with --task {owner}.")
     curriculum(args.expert, args.task)
     profile = load_profile(args.profile or TASKS[args.task].profile)
-    if args.expert not in experts_of(profile):
-        inputs = " and ".join(profile.features.inputs)
-        what = f"a robot of the profile '{profile.name}' has no {args.expert} expert: it learns from {inputs}"
-        raise ConfigError(what, f"Leave --profile out for that of the task, '{TASKS[args.task].profile}'.")
+    check_learned(args.expert, profile)
     path: Path = args.out or shipped_path(args.expert, profile, args.task)
     if path.suffix != SUFFIX:  # by which all that reads it knows it
         raise ConfigError(f"{path} is no {SUFFIX} file", f"Name the checkpoint {path.name or args.expert}{SUFFIX}.")
