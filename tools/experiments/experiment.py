@@ -30,7 +30,7 @@ class Table:
 class Finding:
     """One statement of the thesis held against our numbers.
 
-    `key` is unique among all experiments and finds the likely cause of a difference in `results/causes.toml`.
+    `key` is unique among all experiments and finds the likely cause of a difference in `causes.toml`.
     `thesis` and `ours` are the numbers in words; `agrees` is computed from them by the experiment.
     """
 
