@@ -73,6 +73,18 @@ def test_each_beam_has_its_time():
     assert scan.stamp_s + beam * scan.time_increment == pytest.approx(turn.time_s[ahead], abs=0.001)
 
 
+@pytest.mark.parametrize("mirror", [False, True])
+@pytest.mark.parametrize("ascending_time", [False, True])
+def test_no_beam_is_from_the_future_when_points_came_late(mirror, ascending_time):
+    turn = cut(*spin(3.0), mounting=Mounting(0.0, mirror))[0]
+    share = np.linspace(0.0, 1.0, len(turn.time_s))
+    late = Turn(turn.bearing_rad, turn.distance_m, turn.time_s[0] + 0.1 * np.sqrt(share))
+    scan = scan_of(late, LIDAR, ascending_time=ascending_time)
+    last_s = scan.stamp_s + (len(scan.ranges) - 1) * scan.time_increment
+    assert max(scan.stamp_s, last_s) <= late.time_s[-1] + 1e-9
+    assert min(scan.stamp_s, last_s) > late.time_s[0] - 0.01
+
+
 def test_a_point_on_the_seam_does_not_confuse_the_times():
     turn = cut(*spin(3.0, start_rad=math.pi))[0]
     assert turn.bearing_rad[0] == -math.pi
