@@ -143,6 +143,9 @@ def test_what_more_teaching_does_is_held_against_what_was_proven():
     taught_on = run("plus", 0, [(20, 12)], more=[judged([], 9)])
     rows = equal_quality.more_rows({"plus": [taught_on]})
     assert [(row["when"], row["unseen_passed"]) for row in rows] == [("proven", 12), ("taught on", 9)]
+    later = msgspec.structs.replace(taught_on, points=(*taught_on.points, point(2, 50, 12)))
+    rows = equal_quality.more_rows({"plus": [taught_on, later, later]})
+    assert [(row["human_labels"], row["human_labels_max"]) for row in rows] == [(20, 20), (50, 50)]
     assert equal_quality.more_rows({"plus": [run("plus", 0, [(20, 12)])]}) == []
 
 

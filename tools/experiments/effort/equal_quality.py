@@ -49,13 +49,19 @@ def tried(outcomes: Outcomes, level: float | None, way: str) -> list[Judged]:
 def effort_row(group: Outcomes, level: float) -> Row:
     """Effort to a level: medians, the 90 % quantile and the worst; then the layouts that decided nothing."""
     efforts = [reached(outcome, level) for outcome in group]
-    row: Row = {"n": len(group), "censored": sum(not each.converged for each in efforts)}
-    for quantity in TAILS:
-        values = sorted(pairs.taken(each, quantity) for each in efforts)
-        row |= {quantity: median(values), f"{quantity}_90": tail(values), f"{quantity}_max": values[-1]}
+    row: Row = {"n": len(group), "censored": sum(not each.converged for each in efforts)} | tails(efforts)
     for quantity in ("demonstration", "human_s", "calls", "lap"):
         row[quantity] = median([pairs.taken(each, quantity) for each in efforts])
     return row | driving_row(tried(group, level, "plain"), "unseen")
+
+
+def tails(efforts: Sequence[Point]) -> Row:
+    """Median, 90 % quantile and worst of what was taken."""
+    row: Row = {}
+    for quantity in TAILS:
+        values = sorted(pairs.taken(each, quantity) for each in efforts)
+        row |= {quantity: median(values), f"{quantity}_90": tail(values), f"{quantity}_max": values[-1]}
+    return row
 
 
 def driving_row(judged: Sequence[Judged], name: str) -> Row:
@@ -121,9 +127,15 @@ def more_rows(groups: Groups) -> list[Row]:
     rows: list[Row] = []
     for name, group in groups.items():
         level = max((level for o in group for each in o.judged for level in each.levels), default=None)
-        for words, judged in (("proven", tried(group, level, "plain")), ("taught on", tried(group, None, "plain"))):
-            if level is not None and tried(group, None, "plain"):
-                rows.append({"method": name, "when": words} | driving_row(judged, "unseen"))
+        on = [outcome for outcome in group if any(not each.levels for each in outcome.judged)]
+        if level is None or not on:
+            continue
+        proven, last = [reached(outcome, level) for outcome in on], [outcome.points[-1] for outcome in on]
+        for words, efforts, judged in (
+            ("proven", proven, tried(on, level, "plain")),
+            ("taught on", last, tried(on, None, "plain")),
+        ):
+            rows.append({"method": name, "when": words} | tails(efforts) | driving_row(judged, "unseen"))
     return rows
 
 
