@@ -86,7 +86,9 @@ def drives(page, hold, steer, let_go, applied, what):
         if seat(page) != "yours":
             wait_until(lambda: seat(page) == "free", what="the seat is not free")
             sit(page)
-    raise AssertionError(f"{what}; the page says '{who(page)}', the seat is {seat(page)}, and {applied.all[-1:]}")
+    focused = page.execute_script("return document.hasFocus()")
+    says = f"the page says '{who(page)}', the seat is {seat(page)}, it has the focus: {focused}, and {applied.all[-1:]}"
+    raise AssertionError(f"{what}; {says}")
 
 
 def keys(driver, applied):
