@@ -16,7 +16,8 @@ from lira.hal.config import MALFORMED, read_bounded
 from lira.hal.errors import ConfigError, StorageError
 from lira.tools.bench import Row
 
-SPEED, COST = "real_time_factor", "ratio"  # parts of the names of fields: more is better, and less is better
+SPEEDS, COST = ("real_time_factor", "speedup"), "ratio"  # parts of names: more of these is better, and less of this
+SETTINGS = ("filters",)  # numbers that say, as words do, which row it is
 WORSE = 0.30  # of the median before
 LONGEST_BYTES = 16 * 2**20
 
@@ -35,11 +36,15 @@ def ratios(rows: Sequence[Row]) -> dict[str, float]:
     """Return what is worth comparing, by the words of its row and the name of its field."""
     found = {}
     for row in rows:
-        words = [value for value in row.values() if isinstance(value, str)]
+        words = [f"{value}" for field, value in row.items() if isinstance(value, str) or field in SETTINGS]
         for field, value in row.items():
-            if (SPEED in field or COST in field) and isinstance(value, int | float) and math.isfinite(value):
+            if (_is_speed(field) or COST in field) and isinstance(value, int | float) and math.isfinite(value):
                 found[" ".join([*words, field])] = float(value)
     return found
+
+
+def _is_speed(name: str) -> bool:
+    return any(speed in name for speed in SPEEDS)
 
 
 def entry(machine: dict[str, Any], version: str, rows: Sequence[Row]) -> Entry:
@@ -56,7 +61,7 @@ def worse(now: Entry, before: Sequence[Entry]) -> list[str]:
         if not past:
             continue
         median = statistics.median(past)
-        if value < median * (1 - WORSE) if SPEED in name else value > median * (1 + WORSE):
+        if value < median * (1 - WORSE) if _is_speed(name) else value > median * (1 + WORSE):
             lines.append(f"{name}: {value:.3g}, and {median:.3g} in the median of {len(past)} runs before")
     return lines
 

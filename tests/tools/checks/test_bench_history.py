@@ -22,6 +22,13 @@ def test_ratios_are_kept_by_row_and_field_and_times_are_not():
         "thesis-sim ratio_to_bare": 1.2,
         "rosbot2 egl real_time_factor": 20.0,
     }
+    beside = [{"filters": filters, "trunks": "full", "step_s": 0.2, "speedup": 2.0} for filters in (16, 32)]
+    assert history.ratios(beside) == {"16 full speedup": 2.0, "32 full speedup": 2.0}
+
+
+def test_a_benchmark_without_a_ratio_leaves_nothing(tmp_path):
+    assert not bench.note(tmp_path / "log.jsonl", [{"labels": 1_000_000, "seconds": 2.0}])
+    assert not (tmp_path / "log.jsonl").exists()
 
 
 @pytest.mark.parametrize(
@@ -30,6 +37,7 @@ def test_ratios_are_kept_by_row_and_field_and_times_are_not():
         ("real_time_factor", 71.0, False),
         ("real_time_factor", 69.0, True),
         ("real_time_factor", 1000.0, False),
+        ("16 full speedup", 69.0, True),
         ("ratio_p50", 129.0, False),
         ("ratio_p50", 131.0, True),
         ("ratio_p50", 1.0, False),

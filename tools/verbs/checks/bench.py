@@ -68,6 +68,8 @@ def note(path: Path, results: list[Row]) -> bool:
     from lira.tools.output.bench_history import append, entry, read_history, worse
 
     before, now = read_history(path), entry(describe_machine(), version("lira-rosbot"), results)
+    if not now.ratios:  # it compares with nothing
+        return False
     append(path, now)
     lines = worse(now, before)
     if lines:
