@@ -49,8 +49,8 @@ def robot_that_drives():
 @contextlib.contextmanager
 def page_of_robot(folder):
     """The bus, the page's address, and `lira web` as a process, while a policy drives the robot."""
-    port = free_port()
     with robot_that_drives() as (name, endpoint, bus), contextlib.ExitStack() as stack:
+        port = free_port()
         words = ["--name", name, "--connect", endpoint, "--port", str(port)]
         web = stack.enter_context(ChildProcess("lira web", lira_command("web", *words), folder / "web.log"))
         web.wait_ready("web shows", 30.0)

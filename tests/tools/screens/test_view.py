@@ -41,8 +41,8 @@ RATES = {"/scan": 10.0, "/odom": 20.0, "/cmd_vel/applied": 20.0}
 def beside(tmp_path_factory):
     """A robot that drives and `lira view` beside it: the bus, the process, and the ports of Foxglove and metrics."""
     folder = tmp_path_factory.mktemp("view")
-    port, metrics = free_port(), free_port()
     with robot_that_drives() as (name, endpoint, bus):
+        port, metrics = free_port(), free_port()  # not sooner: the robot's own might be one of them
         words = ["--name", name, "--connect", endpoint, "--port", str(port), "--metrics", str(metrics)]
         with ChildProcess("lira view", lira_command("view", *words), folder / "view.log") as view:
             view.wait_ready("numbers for Prometheus", 30.0)
