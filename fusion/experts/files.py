@@ -53,7 +53,7 @@ def check_pair(pair: str) -> None:
     """Raise `ConfigError` for what is no pair of any robot: no task, no TASK@SEED, and no folder with an expert."""
     if pair in TASKS or seeded(pair) is not None:
         return
-    if not any((Path(pair) / f"{name}.safetensors").is_file() for name in EXPERTS):
+    if not any((Path(pair) / f"{name}{SUFFIX}").is_file() for name in EXPERTS):
         remedy = (
             f"Give a folder with camera.safetensors and lidar.safetensors, a task ({', '.join(TASKS)}), or TASK@SEED."
         )
@@ -84,7 +84,7 @@ def expert_path(name_or_path: str, profile: RobotProfile, pair: str = DEFAULT) -
         raise ConfigError(f"unknown policy '{name_or_path}'", f"Known: {names}; or give a .safetensors file.")
     train = f"lira train-expert {name} --profile {profile.name}"
     if pair not in TASKS:
-        path = folder_of(pair) / f"{name}.safetensors"
+        path = folder_of(pair) / f"{name}{SUFFIX}"
         if not path.exists():
             check_learned(name, profile)
             known = ", ".join(TASKS)

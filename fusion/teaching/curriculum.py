@@ -7,6 +7,7 @@ from itertools import product
 import msgspec
 import numpy as np
 
+from lira.fusion.experts.files import tasks_with
 from lira.fusion.experts.tasks import DEFAULT, TASKS
 from lira.fusion.teaching.ride import Drive
 from lira.fusion.teaching.teacher import PERFECT, SKILLED, TeacherSettings
@@ -199,6 +200,6 @@ def curriculum(kind: str, task: str) -> Curriculum:
     """
     owner = TASKS[task].owner(kind)
     if kind not in CURRICULA[owner]:
-        trained = " or ".join(f"--task {name}" for name, courses in CURRICULA.items() if kind in courses)
+        trained = " or ".join(f"--task {name}" for name in tasks_with(kind))
         raise ConfigError(f"the task '{task}' has no {kind} expert", f"Train one with {trained}.")
     return CURRICULA[owner][kind]
