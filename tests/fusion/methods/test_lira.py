@@ -4,6 +4,7 @@ import itertools
 
 import numpy as np
 import pytest
+from taught import FixedNetwork
 
 from lira.fusion.learning.novice import LearningSettings, NetworkNovice, is_redundant
 from lira.fusion.log.counts import Ledger
@@ -124,22 +125,8 @@ class NoTrainer:
         pass
 
 
-class FixedNetwork:
-    def __init__(self, action=NOVICE):
-        self.action = action
-
-    def act(self, seen):
-        return self.action
-
-    def act_all(self, seen):
-        return [self.action] * len(seen)
-
-    def load_weights(self, weights):
-        pass
-
-
 def make_novice(*, trained=True, **settings):
-    novice = NetworkNovice(FixedNetwork(), NoTrainer(), LearningSettings(**settings))
+    novice = NetworkNovice(FixedNetwork(NOVICE), NoTrainer(), LearningSettings(**settings))
     novice.training_steps = int(trained)
     return novice
 
