@@ -1,5 +1,7 @@
 """Methods at equal quality, from outcomes made up by hand."""
 
+import dataclasses
+
 import msgspec
 import pytest
 from made_up_outcomes import outcome
@@ -8,9 +10,11 @@ from lira.fusion.methods import presets
 from lira.fusion.methods.syllabus import Syllabus
 from lira.fusion.teaching.teacher import UNSKILLED
 from lira.hal.errors import ConfigError
+from lira.tools.cli import main
 from lira.tools.experiments.effort import equal_quality
 from lira.tools.experiments.effort.equal_quality import curve, reached, tail
 from lira.tools.experiments.output import document, lead
+from lira.tools.experiments.output.fields import SHOWN, lacking
 from lira.tools.experiments.output.summary import read_summary, summarise, to_json
 from lira.tools.experiments.quality import Judged, Point
 from lira.tools.experiments.registry import REGISTRY, load
@@ -275,3 +279,34 @@ def test_results_stay_short_with_every_method_and_say_when_nothing_was_played():
     assert "[gray](docs/results/unseen.md#unseen-gray)" in texts["RESULTS.md"]
     assert "What each part of plus is worth" in texts["RESULTS.md"]
     assert "has not been played yet" in document.documents(thesis, {})["RESULTS.md"]
+
+
+def without(summary, name):
+    """A summary as of a version that knew nothing of a field."""
+    bare = {each: [drop(row, name) for row in getattr(summary, each)] for each in ("results", "ratios", "curves")}
+    tables = [dataclasses.replace(each, rows=[drop(row, name) for row in each.rows]) for each in summary.tables]
+    return msgspec.structs.replace(summary, tables=tables, **bare)
+
+
+def drop(row, name):
+    return {key: value for key, value in row.items() if key != name}
+
+
+@pytest.mark.parametrize("name", sorted({name for names in SHOWN.values() for name in names}))
+def test_a_summary_of_another_version_is_shown_with_empty_cells_and_says_which(tmp_path, capsys, name):
+    taught_on = [run("plus", seed, [(20, 12)], more=[judged([], 9)]) for seed in range(3)]
+    more = summarise("unseen-more1", "words", "lira experiment unseen --more 1", 3, load("unseen"), taught_on)
+    main_one, gray, _ = summaries(["plus", "hg-dagger"])
+    assert not any(map(lacking, (main_one, gray, more)))
+    for each in (without(main_one, name), gray, without(more, name)):
+        (tmp_path / f"{each.name}.json").write_text(to_json(each))
+    out = tmp_path / "out" / "RESULTS.md"
+    assert main(["experiment", "results", "--summaries", str(tmp_path), "--out", str(out)]) == 0
+    said = capsys.readouterr().err
+    file = tmp_path / ("unseen-more1.json" if name == "when" else "unseen.json")
+    assert f"{file} is of another version: no {name} in '" in said
+    assert "  Play it again: lira experiment unseen " in said
+    assert f" --json {file}\n" in said
+    assert "unseen-gray.json" not in said
+    assert "| [gray](docs/results/unseen.md#unseen-gray) | plus | 3 | 0 | 40, 40, 40 |" in out.read_text()
+    assert "None" not in out.read_text()

@@ -9,6 +9,7 @@ from lira.hal.config import write_whole
 from lira.tools.bench import cell
 from lira.tools.experiments.effort.pairs import TOTAL
 from lira.tools.experiments.experiment import Picture, Row
+from lira.tools.experiments.output.fields import filled, rows_of
 from lira.tools.experiments.output.markdown import table
 from lira.tools.experiments.output.summary import Summary
 
@@ -96,14 +97,14 @@ def lead(summaries: Sequence[Summary]) -> str:
     return "".join(parts)
 
 
+def leads(summary: Summary) -> bool:
+    """Whether it is one of those that the page leads with."""
+    return summary.name.startswith(LED_BY) or summary.name == PARTS
+
+
 def played_with(summary: Summary) -> str:
     """Of which version it is, in words that follow others."""
     return f", played with {summary.commit}" if summary.commit else ""
-
-
-def rows_of(summary: Summary, title: str) -> list[list[Row]]:
-    """The rows of each table whose title begins so."""
-    return [each.rows for each in summary.tables if each.title.startswith(title)]
 
 
 def efforts(summary: Summary) -> list[list[Row]]:
@@ -137,10 +138,10 @@ def deployed(summary: Summary) -> list[Row]:
     """One row per method, a column per way."""
     found: dict[object, Row] = {}
     for row in chain.from_iterable(rows_of(summary, "Deployed")):
-        words = f"{row['unseen_passed']} of {row['unseen_laps']}, {row['collisions']}"
+        words = f"{cell(row['unseen_passed'])} of {cell(row['unseen_laps'])}, {cell(row['collisions'])}"
         if row["stops"]:
             words += f", {row['stops']} stops"
-        found.setdefault(row["method"], {"method": row["method"]})[str(row["deployed"])] = words
+        found.setdefault(row["method"], {"method": row["method"]})[cell(row["deployed"])] = words
     return list(found.values())
 
 
@@ -173,23 +174,30 @@ def condition(summary: Summary) -> list[Row]:
 
 
 def spread(row: Row, quantity: str) -> str:
-    """Median, 90 % quantile and worst."""
-    return f"{cell(row[quantity])}, {cell(row[f'{quantity}_90'])}, {cell(row[f'{quantity}_max'])}"
+    """Median, 90 % quantile and worst, as far as they are there."""
+    found = [row[quantity], row[f"{quantity}_90"], row[f"{quantity}_max"]]
+    return ", ".join(cell(value) for value in found if value is not None)
 
 
 def passed(row: Row) -> str:
     """Layouts passed, with the share's interval in percent."""
-    if not row["unseen_laps"]:
+    if row["unseen_laps"] == 0:
         return "none came so far"
-    low, high = (100.0 * float(str(row[key])) for key in ("share_low", "share_high"))
-    return f"{row['unseen_passed']} of {row['unseen_laps']} [{low:.0f}, {high:.0f}] %"
+    found = [row[key] for key in ("unseen_passed", "unseen_laps", "share_low", "share_high")]
+    if None in found:
+        return ""
+    low, high = (100.0 * float(str(value)) for value in found[2:])
+    return f"{found[0]} of {found[1]} [{low:.0f}, {high:.0f}] %"
 
 
 def ratio(summary: Summary, of: Row, quantity: str) -> str:
     """A method's ratio in words; nothing for what all are compared with."""
-    for row in summary.ratios:
-        if (row["against"], row["quantity"], row.get("quality")) == (of["method"], quantity, of["quality"]):
-            return f"{row['median']:.2g} [{row['low']:.2g}, {row['high']:.2g}]"
+    for row in filled(summary.ratios, "ratios"):
+        found = [row[key] for key in ("median", "low", "high")]
+        same = (row["against"], row["quantity"], row["quality"]) == (of["method"], quantity, of["quality"])
+        if same and None not in found:
+            median, low, high = (float(str(value)) for value in found)
+            return f"{median:.2g} [{low:.2g}, {high:.2g}]"
     return ""
 
 
@@ -199,7 +207,8 @@ def draw(summaries: Sequence[Summary], folder: Path) -> None:
     from lira.tools.experiments.output.page import render
 
     for summary in summaries:
-        if summary.name == LED_BY and summary.curves:
-            rows = [row for row in summary.curves if row["quantity"] == "human_labels"]
+        rows = [row for row in filled(summary.curves, "curves") if row["quantity"] == "human_labels"]
+        rows = [row for row in rows if None not in (row["at"], row["share"])]
+        if summary.name == LED_BY and rows:
             _, svg = render(Picture("curves", "", partial(plots.curves, rows)))
             write_whole(folder / PICTURE, svg, folder=True)

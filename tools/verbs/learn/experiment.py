@@ -19,6 +19,7 @@ examples:
 """
 
 import argparse
+import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -158,6 +159,7 @@ def show(summary: "Summary", page: Path) -> None:
 def write_results(args: argparse.Namespace) -> int:
     """Play everything first if asked to; then write the documents from the summaries that are there."""
     from lira.tools.experiments.output import document, lead
+    from lira.tools.experiments.output.fields import lacking
     from lira.tools.experiments.output.summary import read_summaries, write_summary
 
     if args.methods is not None or args.method:
@@ -174,5 +176,10 @@ def write_results(args: argparse.Namespace) -> int:
     out = args.out or document.DOCUMENT
     document.write_documents(out, document.documents(summaries, document.read_causes(), out.name))
     lead.draw(summaries, out.parent)
+    for each in filter(lead.leads, summaries):
+        if lacks := lacking(each):
+            path = folder / f"{each.name}.json"
+            print(f"{path} is of another version: no {', no '.join(lacks)}, and so empty cells", file=sys.stderr)
+            print(f"  Play it again: {each.command} --json {path}", file=sys.stderr)
     print(f"results: {out}, and {document.PAGES} beside it")
     return 0
