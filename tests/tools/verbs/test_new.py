@@ -79,11 +79,29 @@ def test_it_is_formatted_as_a_linter_wants_it(project):
         assert done.returncode == 0, done.stdout
 
 
-@pytest.mark.parametrize("name", ["class", "json", "lira", "My Wall", "3walls", "Wall", ""])
+@pytest.mark.parametrize("name", ["class", "My Wall", "3walls", "Wall", ""])
 def test_a_name_that_can_be_no_module_is_refused(tmp_path, capsys, name):
     assert main(["new", "expert", name, "--into", str(tmp_path / "there")]) == 2
     assert "cannot be the name of a module" in capsys.readouterr().err
     assert not (tmp_path / "there").exists()
+
+
+@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize(
+    "name", ["json", "lira", "numpy", "torch", "zenoh", "cv2", "ruamel", "hypothesis", "eclipse-zenoh"]
+)
+def test_a_name_that_would_hide_what_is_installed_is_refused(tmp_path, capsys, kind, name):
+    assert main(["new", kind, name, "--into", str(tmp_path / "there")]) == 2
+    what, remedy = capsys.readouterr().err.splitlines()
+    assert what == f"lira new: there is a module or a package '{name}' already, which yours would hide"
+    assert f"such as my-{name}" in remedy
+    assert not (tmp_path / "there").exists()
+
+
+def test_what_is_not_installed_but_would_be_used_is_refused_too(tmp_path, capsys, monkeypatch):
+    monkeypatch.setattr(sys, "path", [])
+    assert main(["new", "expert", "torch", "--into", str(tmp_path / "there")]) == 2
+    assert "there is a module or a package 'torch' already" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(

@@ -15,12 +15,15 @@ import argparse
 import keyword
 import sys
 from importlib import resources
+from importlib.machinery import PathFinder
+from importlib.metadata import PackageNotFoundError, distribution
 from importlib.resources.abc import Traversable
 from pathlib import Path
 from string import Template
 from typing import NamedTuple
 
 from lira.hal.errors import ConfigError, StorageError
+from lira.tools.cli import EXTRAS
 
 
 class Kind(NamedTuple):
@@ -112,13 +115,30 @@ def names_of_ours(kind: str) -> set[str]:
 def package_of(name: str) -> str:
     """Return the module's name. Raises `ConfigError` for a name that cannot be one, or that hides another module."""
     package = name.replace("-", "_")
-    taken = keyword.iskeyword(package) or package in sys.stdlib_module_names or package in ("lira", "numpy", "pytest")
-    if taken or not package.isidentifier() or package != package.lower():
+    if keyword.iskeyword(package) or not package.isidentifier() or package != package.lower():
         what = f"'{name}' cannot be the name of a module"
-        raise ConfigError(
-            what, "Use small letters, digits and hyphens, and no name that Python has already, such as my-wall."
-        )
+        raise ConfigError(what, "Use small letters, digits and hyphens, such as my-wall.")
+    if is_taken(package, name):
+        what = f"there is a module or a package '{name}' already, which yours would hide"
+        raise ConfigError(what, f"Choose another, such as my-{name}.")
     return package
+
+
+def is_taken(package: str, name: str) -> bool:
+    """Whether Python, this project or what is installed beside it has a module, or a package, of that name."""
+    from lira.tools.doctor.machine import BASE
+
+    ours = {each.partition(".")[0] for each in (*BASE, *EXTRAS)} | {"lira", "pytest"}
+    if package in sys.stdlib_module_names or package in ours:
+        return True
+    module = PathFinder.find_spec(package)
+    if module is not None and module.origin is not None:  # without an origin it is a mere folder
+        return True
+    try:
+        distribution(name)
+    except PackageNotFoundError:
+        return False
+    return True
 
 
 def templates(kind: str) -> list[Traversable]:
