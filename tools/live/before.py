@@ -51,7 +51,8 @@ def sum_up(records: Iterable[Record], head: RunRecord | None = None) -> Before:
                 account = record.account
             case RunRecord():
                 if head is not None and (record.preset, record.profile) != (head.preset, head.profile):
-                    what = f"this folder was taught by '{record.preset}' on a '{record.profile}'"
+                    then, now = (f"by '{each.preset}' on a '{each.profile}'" for each in (record, head))
+                    what = f"this folder was taught {then}, not {now}"
                     raise ConfigError(what, "Go on with these, or choose another --run.")
     return Before(
         newest,

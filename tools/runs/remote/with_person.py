@@ -35,7 +35,7 @@ def learn_from_person(
     head, folder = plan.head(profile, world), plan.folder
     notifier = Notifier.from_environment()  # before a process is started that would inherit it
     assert folder is not None
-    before = days_before(folder / RECORD)
+    before = days_before(folder / RECORD, head)
     # The log goes first: if it is damaged, nothing else is touched.
     with (
         DemonstrationLog(folder / LABELS, profile, mirrored=plan.preset.mirrored, say=say) as log,

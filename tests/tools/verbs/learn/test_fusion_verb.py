@@ -14,6 +14,7 @@ from lira.fusion.inference.architecture import Architecture
 from lira.fusion.inference.build import driving
 from lira.fusion.inference.checkpoint import Checkpoint, save_checkpoint
 from lira.fusion.log.label_log import Demonstration, DemonstrationLog
+from lira.fusion.log.run_log import RunRecord, RunWriter
 from lira.fusion.preprocess import Features, shapes_of
 from lira.hal.bus.bus import Bus
 from lira.hal.client import connect
@@ -114,6 +115,18 @@ def test_the_log_of_another_robot_is_refused_and_left_as_it_is(address, refused,
     what, _ = refused("fusion", *address, "--method", "hg-dagger", "--run", tmp_path)
     assert "holds demonstrations for 'rosbot2'" in what
     assert path.read_bytes() == before
+
+
+def test_a_run_that_was_taught_by_another_method_is_refused_and_left_as_it_is(address, refused, tmp_path):
+    head = RunRecord("line", PROFILE.name, "plus", "plus", 0, 0, "lira fusion --method plus", "0")
+    with RunWriter(tmp_path / "run.jsonl") as record:
+        record.write(head)
+    before = (tmp_path / "run.jsonl").read_bytes()
+    what, remedy = refused("fusion", *address, "--method", "hold", "--run", tmp_path)
+    assert what == "lira fusion: this folder was taught by 'plus' on a 'thesis-sim', not by 'hold' on a 'thesis-sim'"
+    assert remedy == "  Go on with these, or choose another --run."
+    assert (tmp_path / "run.jsonl").read_bytes() == before
+    assert [path.name for path in tmp_path.iterdir()] == ["run.jsonl"]
 
 
 def test_a_folder_that_holds_a_run_is_left_alone(address, refused, tmp_path):
