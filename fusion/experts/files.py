@@ -5,6 +5,7 @@ are meant: those of a task, by its name; others of that task, as TASK@SEED, trai
 user's own, by the folder that holds `camera.safetensors`, `lidar.safetensors` and whatever else the robot learns from.
 """
 
+from collections.abc import Collection
 from importlib import resources
 from pathlib import Path
 
@@ -28,9 +29,16 @@ def check_learned(name: str, profile: RobotProfile) -> None:
     if name in experts_of(profile):
         return
     inputs = " and ".join(profile.features.inputs)
-    known = [f"'{other}'" for other in known_profiles() if name in experts_of(load_profile(other))]
     what = f"a robot of the profile '{profile.name}' has no {name} expert: it learns from {inputs}"
-    raise ConfigError(what, f"Profiles of robots that have one: {', '.join(known)}.")
+    raise ConfigError(what, who_has([name]))
+
+
+def who_has(sensors: Collection[str]) -> str:
+    """Say with which profile a robot learns from all of these sensors."""
+    known = [name for name in known_profiles() if set(sensors) <= set(experts_of(load_profile(name)))]
+    if not known:
+        return f"Take a profile of your own whose robot learns from {' and '.join(sensors)}."
+    return f"With --profile {' or '.join(known)} the robot learns from {' and '.join(sensors)}."
 
 
 def tasks_with(name: str) -> list[str]:

@@ -10,7 +10,7 @@ from typing import cast
 import numpy as np
 
 from lira.fusion.experts.files import EXPERTS as NAMES
-from lira.fusion.experts.files import SUFFIX, check_pair, expert_path
+from lira.fusion.experts.files import SUFFIX, check_pair, expert_path, who_has
 from lira.fusion.experts.tasks import DEFAULT
 from lira.fusion.inference.checkpoint import Checkpoint, load_checkpoint
 from lira.fusion.inference.kernel_net import KernelNet
@@ -18,7 +18,7 @@ from lira.fusion.inference.networks import DrivingNet
 from lira.fusion.methods.base import Alone, Expert, Method, Policy
 from lira.fusion.methods.shield import Shield, Shielded
 from lira.fusion.methods.stop_and_ask import Doubtful
-from lira.fusion.preprocess import Features, Shape, shapes_of
+from lira.fusion.preprocess import MODALITIES, Features, Shape, shapes_of
 from lira.hal.errors import ConfigError, PluginError
 from lira.hal.messages import Action
 from lira.hal.plugins import EXPERTS
@@ -33,10 +33,16 @@ def load_network(name_or_path: str, profile: RobotProfile, pair: str = DEFAULT) 
     network, checkpoint = load_checkpoint(path)
     own = {**shapes_of(profile), "filters": (profile.features.filters,)}
     seen = {**checkpoint.features, **({"filters": (checkpoint.filters,)} if checkpoint.filters else {})}
+    if unseen := [MODALITIES[name].sensor for name in checkpoint.features if name not in own]:
+        inputs = " and ".join(profile.features.inputs)
+        what = f"{path} was trained for '{checkpoint.profile}' and needs its {' and '.join(unseen)}"
+        what += f"; a robot of the profile '{profile.name}' learns from {inputs} alone"
+        raise ConfigError(what, who_has(unseen))
     if any(own.get(name) != shape for name, shape in seen.items()):
         raise ConfigError(
             f"{path} was trained for '{checkpoint.profile}' ({_sizes(seen)}), not for '{profile.name}' ({_sizes(own)})",
-            "Use the checkpoint of this profile, or start with the profile it was trained for.",
+            "Use the checkpoint of this profile, or start the robot with the profile it was trained for: "
+            f"--profile {checkpoint.profile}.",
         )
     return network, checkpoint
 

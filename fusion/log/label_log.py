@@ -175,7 +175,7 @@ class DemonstrationLog:
                 if form != self._format:
                     raise StorageError(
                         f"{self.path} holds demonstrations for {form.words()}, not for {self._format.words()}",
-                        "Give a new file for this robot.",
+                        f"Start the robot with --profile {form.profile}, or give a new file for this one.",
                     )
                 self._format = form  # an older one goes on as it is
                 found = survey(file, form, file.tell())

@@ -119,14 +119,24 @@ def test_a_file_of_ones_own_is_named_after_its_sensor(tmp_path):
 DEPTH_NET = ExpertNet("depth", (32, 32), 16)  # of a robot that learns from depth
 
 
-@pytest.mark.parametrize(
-    "network", [lidar_net(130), camera_net(32), fusion_net(130, 32), fusion_net(101, 32), DEPTH_NET]
-)
+@pytest.mark.parametrize("network", [lidar_net(130), camera_net(32), fusion_net(130, 32), fusion_net(101, 32)])
 def test_the_checkpoint_of_another_robot_is_refused_with_both_names(tmp_path, network):
     path = save(tmp_path / "other.safetensors", network)
     own = r"'thesis-sim' \(image 32x32, scan 101, filters 16\)"
-    with pytest.raises(ConfigError, match=rf"trained for 'rosbot2'.*not for {own}"):
+    with pytest.raises(ConfigError, match=rf"trained for 'rosbot2'.*not for {own}") as refused:
         load_network(path, SIM)
+    assert "--profile rosbot2" in refused.value.remedy
+
+
+def test_a_checkpoint_that_needs_a_sensor_more_names_it_and_who_has_it(tmp_path):
+    path = save(tmp_path / "novice.safetensors", DEPTH_NET, "thesis-sim-depth")
+    with pytest.raises(ConfigError) as refused:
+        load_policy(path, SIM)
+    assert refused.value.what == (
+        f"{path} was trained for 'thesis-sim-depth' and needs its depth; "
+        "a robot of the profile 'thesis-sim' learns from image and scan alone"
+    )
+    assert refused.value.remedy == "With --profile thesis-sim-depth the robot learns from depth."
 
 
 def test_what_an_expert_does_not_see_may_differ(tmp_path):

@@ -112,8 +112,9 @@ def test_a_log_whose_header_is_damaged_is_named_and_left_as_it_is(address, refus
 def test_the_log_of_another_robot_is_refused_and_left_as_it_is(address, refused, tmp_path):
     path = write_log(tmp_path / "labels.lira", OTHER)
     before = path.read_bytes()
-    what, _ = refused("fusion", *address, "--method", "hg-dagger", "--run", tmp_path)
+    what, remedy = refused("fusion", *address, "--method", "hg-dagger", "--run", tmp_path)
     assert "holds demonstrations for 'rosbot2'" in what
+    assert "--profile rosbot2" in remedy
     assert path.read_bytes() == before
 
 

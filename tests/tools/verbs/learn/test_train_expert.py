@@ -101,7 +101,7 @@ def test_a_profile_that_does_not_learn_from_that_sensor_trains_none(capsys):
     assert cli.main(["train-expert", "depth", "--task", "table-top", "--profile", "thesis-sim"]) == 2
     what, remedy = capsys.readouterr().err.splitlines()
     assert "'thesis-sim' has no depth expert: it learns from " in what
-    assert "'thesis-sim-depth'" in remedy
+    assert "--profile thesis-sim-depth" in remedy
 
 
 @pytest.mark.parametrize("name", ["mine", "mine.onnx"])
