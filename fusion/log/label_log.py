@@ -23,6 +23,7 @@ from lira.fusion.log.label_salvage import Damage, Survey, beside, find_format, h
 from lira.hal.config import open_regular
 from lira.hal.errors import StorageError
 from lira.hal.profile import RobotProfile
+from lira.hal.words import plural
 
 # Told to the user while there is still room for this many labels, so that none is lost before the disk is full.
 RESERVE = 256
@@ -119,7 +120,9 @@ class DemonstrationLog:
 
     def _failed(self, error: OSError) -> StorageError:
         what = f"cannot write to {self.path}: {error.strerror}"
-        return StorageError(f"{what}; {len(self._unwritten)} labels wait in memory", "Free some space on that disk.")
+        return StorageError(
+            f"{what}; in memory: {plural(len(self._unwritten), 'label')}", "Free some space on that disk."
+        )
 
     def _check_space(self) -> None:
         disk = os.fstatvfs(self._file)
@@ -184,7 +187,7 @@ class DemonstrationLog:
                 os.close(self._file)
                 self._file = clean
                 self._say(
-                    f"{self.path}: {found.words()}; {found.count} labels are read, the old file is kept as {kept}"
+                    f"{self.path}: {found.words()}; {plural(found.count, 'label')} read, the old file is kept as {kept}"
                 )
             else:
                 os.ftruncate(self._file, found.end)

@@ -17,6 +17,7 @@ from typing import BinaryIO
 
 from lira.fusion.log.label_file import Demonstration, Format, read_format
 from lira.hal.errors import StorageError
+from lira.hal.words import plural
 
 BLOCK = 2**18
 NEAR_BYTES = 2**24
@@ -55,12 +56,12 @@ class Survey:
 
     def words(self) -> str:
         """What is wrong with it, in one line; empty if nothing is."""
-        torn = f"its last {self.torn_bytes} bytes are the rest of a label that was not written to its end"
+        torn = f"at its end: {plural(self.torn_bytes, 'byte')} of a label that was not written to its end"
         broken = self.damages[:-1] if self.torn_bytes else self.damages
         if not broken:
             return torn if self.torn_bytes else ""
         places = ", ".join(str(damage.at) for damage in broken[:3]) + (", ..." if len(broken) > 3 else "")
-        return f"{self.lost_bytes} bytes cannot be read (at byte {places})" + (
+        return f"{plural(self.lost_bytes, 'byte')} cannot be read (at byte {places})" + (
             f", and {torn}" if self.torn_bytes else ""
         )
 

@@ -47,7 +47,7 @@ def rows_of(path):
 
 def test_a_run_becomes_a_lerobot_data_set(run, tmp_path, capsys):
     assert main(["export", "lerobot", str(run), str(tmp_path / "set")]) == 0
-    assert "2 episodes, 9 steps; 1 of them are labels learned, by the recording's counts" in capsys.readouterr().out
+    assert "2 episodes, 9 steps; labels learned: 1, by the recording's counts" in capsys.readouterr().out
     rows = pq.read_table(tmp_path / "set/data/chunk-000/file-000.parquet")
     assert len(rows) == sum(LENGTHS)
     assert pq.read_table(tmp_path / "set/meta/tasks.parquet")["task"].to_pylist() == ["drive in line"]
@@ -58,7 +58,7 @@ def test_the_labels_beside_it_say_what_was_learned(run, tmp_path, capsys):
         for number, driver in enumerate(("human", "human", "camera")):
             log.append(label(number, driver, stored=True))
     assert main(["export", "csv", str(run), str(tmp_path / "run.csv")]) == 0
-    assert "3 of them are labels learned, by " in capsys.readouterr().out
+    assert "labels learned: 3, by " in capsys.readouterr().out
     assert [row["in_buffer"] for row in rows_of(tmp_path / "run.csv")][:4] == ["1", "1", "1", "0"]
 
 

@@ -79,7 +79,7 @@ def test_only_what_a_person_drove_is_taken_unless_more_is_asked_for(data_set):
 
 def test_import_makes_labels_that_a_run_begins_with(data_set, tmp_path, capsys):
     assert main(["import", str(data_set), "--run", str(tmp_path), "--frames", "all"]) == 0
-    assert "9 labels (human 2, camera 1, novice 6) are in" in capsys.readouterr().out
+    assert "to be learned: 9 labels (human 2, camera 1, novice 6)" in capsys.readouterr().out
     labels = list(read_demonstrations(tmp_path / "labels.lira"))
     assert len(labels) == 9
     assert all(label.stored for label in labels)
@@ -311,5 +311,5 @@ def test_what_is_no_bag_is_told(tmp_path, capsys):
 def test_a_bag_becomes_labels(tmp_path, capsys):
     folder = bag(tmp_path / "bag", drive())
     assert main(["import", str(folder), "--run", str(tmp_path / "run")]) == 0
-    assert "5 labels (human 5) are in" in capsys.readouterr().out
+    assert "to be learned: 5 labels (human 5)" in capsys.readouterr().out
     assert len(list(read_demonstrations(tmp_path / "run/labels.lira"))) == 5

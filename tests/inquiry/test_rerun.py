@@ -63,7 +63,7 @@ def test_what_was_not_recorded_is_said(plus, tmp_path, capsys):
     folder = write_reports(tmp_path / "rec", profile, reports, skip={lost})
     assert trace_of(folder).missing == 1
     assert main(["rerun", str(folder)]) == 1
-    assert "1 messages of its calls were not recorded" in capsys.readouterr().out
+    assert "not recorded: 1 message of its calls" in capsys.readouterr().out
 
 
 def test_the_verb_says_identical_and_tells_it_to_a_machine(plus, tmp_path, capsys):

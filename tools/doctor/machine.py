@@ -10,6 +10,7 @@ import time
 from importlib.metadata import PackageNotFoundError, requires, version
 from pathlib import Path
 
+from lira.hal.words import plural
 from lira.tools.cli import EXTRAS
 from lira.tools.doctor.finding import Finding, Patient, fail, ok, warn
 
@@ -110,7 +111,7 @@ def load(_: Patient) -> Finding:
         start_s = time.monotonic()
         time.sleep(ASLEEP_S)
         longest_s = max(longest_s, time.monotonic() - start_s - ASLEEP_S)
-    words = f"{cores} cores, load {busy:.1f}, longest wait for them {1e3 * longest_s:.0f} ms"
+    words = f"{plural(cores, 'core')}, load {busy:.1f}, longest wait for them {1e3 * longest_s:.0f} ms"
     values = {"cores": cores, "load": busy, "longest_wait_s": longest_s}
     if longest_s > STALL_S or busy > 2 * cores:
         return warn(words, "End other programs: what comes late is refused, and the robot stands.", **values)

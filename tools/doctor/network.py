@@ -8,6 +8,7 @@ from contextlib import closing
 from lira.hal.bus.bus import Bus
 from lira.hal.bus.services import ask_info
 from lira.hal.bus.topics import INFO, ODOM, SCAN
+from lira.hal.words import plural
 from lira.tools.doctor.finding import Finding, Patient, fail, need, ok, warn
 
 ANSWER_S = 5.0
@@ -47,8 +48,8 @@ def _links(bus: Bus) -> Finding:
     count, short = bus.links(), bus.short_peers()
     if short:
         remedy = "Open the robot's port for UDP, too, in every firewall between: over TCP alone commands come late."
-        return warn(f"{count} links: UDP does not get through", remedy, links=count)
-    return ok(f"{count} links, TCP and UDP", links=count)
+        return warn(f"{plural(count, 'link')}: UDP does not get through", remedy, links=count)
+    return ok(f"{plural(count, 'link')}, TCP and UDP", links=count)
 
 
 def _losses(bus: Bus, seconds: float) -> Finding:

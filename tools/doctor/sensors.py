@@ -12,6 +12,7 @@ import numpy as np
 from lira.hal.bus.topics import CAMERA, ODOM, SCAN
 from lira.hal.errors import StorageError
 from lira.hal.messages import CompressedImage, DepthImage, LaserScan
+from lira.hal.words import plural
 from lira.robot.camera.address import shown
 from lira.robot.camera.device import CameraDevice
 from lira.robot.camera.port import Picture
@@ -48,7 +49,7 @@ def lidar(patient: Patient) -> list[Finding]:
     lost = device.counts.lost_bytes
     if lost:
         remedy = "Use a port of its own, a shorter cable, no hub."
-        findings.append(warn(f"{lost} bytes of its line were lost", remedy, lost_bytes=lost))
+        findings.append(warn(f"{plural(lost, 'byte')} of its line lost", remedy, lost_bytes=lost))
     return findings
 
 
@@ -79,7 +80,7 @@ def base(patient: Patient) -> list[Finding]:
     if missing:
         findings.append(warn(f"nothing came from: {', '.join(missing)}", "Check the firmware: 0.14.3 to 0.16.2."))
     if device.counts.lost_bytes:
-        words = f"{device.counts.lost_bytes} bytes of its line were lost"
+        words = f"{plural(device.counts.lost_bytes, 'byte')} of its line lost"
         findings.append(warn(words, "Check the cable, and that no console runs on that port."))
     return findings
 
@@ -108,7 +109,7 @@ def camera(patient: Patient) -> list[Finding]:
         findings.append(warn(f"{late} of {len(pictures)} pictures were too old to use", remedy, late=late))
     if device.unreadable:
         remedy = "Set it to JPEGs of the profile's shape."
-        findings.append(warn(f"{device.unreadable} pictures were refused", remedy, refused=device.unreadable))
+        findings.append(warn(f"{plural(device.unreadable, 'picture')} refused", remedy, refused=device.unreadable))
     if patient.out is not None:
         findings.append(_keep(last, patient.out))
     return findings

@@ -9,6 +9,7 @@ from msgspec.structs import replace
 from lira.fusion.methods.presets import method_named
 from lira.fusion.teaching.teacher import TEACHERS
 from lira.hal.errors import ConfigError
+from lira.hal.words import plural
 from lira.sim_backend.shifts import SHIFTS
 from lira.tools.experiments.experiment import Experiment
 from lira.tools.experiments.quality import WAYS, Way
@@ -115,7 +116,7 @@ class Selection:
             raise ConfigError(f"no way of deployment '{min(set(ways) - set(WAYS))}'", f"Ways: {', '.join(WAYS)}.")
         laps, most = self.laps or trial.laps, trial.method.syllabus.most_laps
         if not 0 < laps + self.more <= most:
-            what = f"{laps} laps and {self.more} more are more than there are fresh layouts for"
+            what = f"{plural(laps, 'lap')} and {self.more} more are more than there are fresh layouts for"
             raise ConfigError(what, f"Give --laps and --more of {most} together.")
         return replace(
             trial,

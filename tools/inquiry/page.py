@@ -6,6 +6,7 @@ from itertools import pairwise
 from pathlib import Path
 
 from lira.hal.config import write_whole
+from lira.hal.words import plural
 from lira.tools.inquiry.otherwise import Moment, Otherwise
 from lira.tools.inquiry.trace import Step, Trace, steps_of
 from lira.tools.report.page import styled
@@ -18,11 +19,11 @@ MOMENTS = 200
 def write_page(file: Path, otherwise: Otherwise, trace: Trace, name: str) -> Path:
     """Write it, and return where. Raises `StorageError`."""
     title = f"{trace.recipe.preset.name} as recorded, and {name}"
-    moments = otherwise.moments
+    moments, steps = otherwise.moments, plural(otherwise.steps, "step")
     share = len(moments) / otherwise.steps if otherwise.steps else 0.0
     sections = [
         f"<h1>{escape(title)}</h1>",
-        f'<p class="outcome">In {len(moments)} of {otherwise.steps} steps of teaching ({share:.0%}) another would have '
+        f'<p class="outcome">In {len(moments)} of {steps} of teaching ({share:.0%}) another would have '
         "driven, or another call have been made. The robot is where it was, and the human does what they did.</p>",
         _table(("", "recorded", name), [(row.name, f"{row.was}", f"{row.now}") for row in otherwise.rows]),
         f"<h2>When</h2>{_strip(steps_of(trace.calls), moments, trace.began_s)}",

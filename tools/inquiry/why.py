@@ -7,6 +7,7 @@ import msgspec
 
 from lira.hal.bus.topics import APPLIED, CAMERA, DECISION, ODOM, SCAN, SIM_STATE
 from lira.hal.messages import Applied, Call, CourseState, Decision, Driver, Odometry, Reason, Twist, is_neutral
+from lira.hal.words import plural
 from lira.tools.inquiry.algorithm import activity, line_of, settings_of, spoken
 from lira.tools.inquiry.moment import Moment
 from lira.tools.inquiry.trace import Step
@@ -87,7 +88,7 @@ def _decided(moment: Moment, step: Step) -> list[str]:
     known = (
         ""
         if moment.novice is None
-        else f"   {moment.novice.labels} labels learned, {moment.novice.steps} training steps"
+        else f"   {plural(moment.novice.labels, 'label')} learned, {plural(moment.novice.steps, 'training step')}"
     )
     lines += _line("novice", iter([f"{spoken(decided.novice)}{known}"]))
     lines += _line("human", iter([spoken(step.human) if step.human else _absent(step)]))

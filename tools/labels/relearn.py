@@ -14,6 +14,7 @@ from lira.fusion.log.run_log import RunRecord, read_run
 from lira.fusion.methods.presets import METHODS, Preset
 from lira.fusion.policies.kernel import KernelSettings
 from lira.hal.errors import ConfigError
+from lira.hal.words import plural
 from lira.tools.runs.names import LABELS, NOVICE, RECORD
 
 
@@ -59,7 +60,7 @@ def rewrite(log: Path) -> str:
     _, about = load_checkpoint(path)
     network = novice.frozen()
     save_checkpoint(path, network, replace(about, labels=len(learned), examples=network.architecture.examples))
-    return f"{path} was learned anew from {len(learned)} labels; it has not been proven since"
+    return f"{path} was learned anew from {plural(len(learned), 'label')}; it has not been proven since"
 
 
 def has(folder: Path, name: str) -> bool:

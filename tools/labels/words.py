@@ -5,6 +5,7 @@ from typing import Any
 
 from lira.fusion.learning.learned_policy import Contradiction, Part
 from lira.fusion.log.label_file import Demonstration
+from lira.hal.words import plural
 from lira.tools.labels.numbers import ranges
 from lira.tools.output.table import format_table
 
@@ -109,5 +110,5 @@ def part_table(rows: Sequence[dict[str, Any]]) -> str:
     rest = rows[SHOWN:]
     if rest:
         sums = [f"{sum(row['share'][k] for row in rest):+.3f}" for k in (0, 1)]
-        cells.append([f"{len(rest)} others", *[""] * 6, *sums])
+        cells.append([plural(len(rest), "other"), *[""] * 6, *sums])
     return format_table(EXPLAINED, cells)

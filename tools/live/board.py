@@ -8,6 +8,7 @@ from lira.fusion.log.counts import Ledger
 from lira.fusion.log.run_log import LapRecord
 from lira.fusion.teaching.ride import Tally
 from lira.hal.messages import SessionState, Stage
+from lira.hal.words import plural
 from lira.tools.live.before import Before
 from lira.tools.runs.progress import Say
 
@@ -86,7 +87,7 @@ class Board:
         )
         self._say(
             f"lap {record.lap}: {'passed' if record.passed else 'not passed'}, {alone:.0%} driven without you, "
-            f"collisions {record.collisions}, lost {record.lost}, {record.human_labels} labels of yours"
+            f"collisions {record.collisions}, lost {record.lost}, {plural(record.human_labels, 'label')} of yours"
         )
 
     def note_proof(self, proof: Sequence[LapRecord]) -> None:

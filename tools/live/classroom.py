@@ -14,6 +14,7 @@ from lira.fusion.methods.base import Method
 from lira.fusion.operator_service import Job
 from lira.hal.messages import Driver
 from lira.hal.profile import RobotProfile
+from lira.hal.words import plural
 from lira.tools.live.before import days_before
 from lira.tools.runs.folder import learn_again, snapshot
 from lira.tools.runs.names import LABELS, RECORD
@@ -66,7 +67,7 @@ class Classroom:
         ledger.take_back(Driver.HUMAN, len(taken))
         self.method.close()
         self.method = self._learned()
-        return True, f"the {len(taken)} labels of the last intervention are not learned any more"
+        return True, f"not learned any more: {plural(len(taken), 'label')} of the last intervention"
 
     def snapshot(self) -> Job:
         """Take what was learned as it is now; what is returned writes it."""

@@ -18,6 +18,7 @@ from lira.fusion.log.recorder import Journal
 from lira.fusion.log.run_log import LapRecord, ResultRecord
 from lira.fusion.operator_service import Answer
 from lira.hal.messages import Episode, OperatorRequest, Phase, Request, Stage
+from lira.hal.words import plural
 from lira.tools.live.classroom import Classroom
 from lira.tools.live.exam import Exam
 from lira.tools.live.lap_driver import LapDriver
@@ -144,7 +145,7 @@ class LiveSession:
     def _examine(self, course: Course, layout: int) -> str:
         driver, learner, unseen = self._driver, self._classroom.method, self._rules.unseen
         driver.show(Stage.PROVING)
-        self._say(f"proof: the novice alone here, then on {unseen} layouts that it has not seen; hands off")
+        self._say(f"proof: the novice alone here, then on {plural(unseen, 'layout')} that it has not seen; hands off")
         lap = driver.lap(learner.alone(Phase.PROVE), course.lap(layout), Phase.PROVE, self.board.state.laps)
         self._proof += [lap] if lap is not None else []
         if lap is not None and lap.passed and unseen:

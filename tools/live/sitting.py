@@ -13,6 +13,7 @@ from lira.fusion.log.run_log import RunWriter, VerdictRecord
 from lira.fusion.operator_service import OperatorService
 from lira.hal.bus.topics import SESSION
 from lira.hal.client.remote import RemoteRobot
+from lira.hal.words import plural
 from lira.tools.launch.lifetime import saving, stop_or_interrupt
 from lira.tools.live.board import Board
 from lira.tools.live.classroom import Classroom
@@ -70,7 +71,7 @@ def sit(args: argparse.Namespace, plan: Plan, robot: RemoteRobot, rules: Rules, 
         )
         loop.arm()
         if room.before.newest is not None:
-            say(f"goes on with {room.method.novice.stored} labels learned before")
+            say(f"goes on with {plural(room.method.novice.stored, 'label')} learned before")
         session.run()
         aside = in_the_log(folder / LABELS, room.method.novice.set_aside())
         record.write(msgspec.structs.replace(session.result(), contradictions=tuple(aside)))

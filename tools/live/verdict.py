@@ -31,7 +31,7 @@ def verdict_words(laps: Sequence[LapRecord]) -> str:
 
 def judged_words(passed: int, drives: int) -> str:
     """What a person has judged on a real floor."""
-    return f"It drove {share_words(passed, drives, 'times as you wanted')}"
+    return f"It drove {share_words(passed, drives, 'time', ' as you wanted')}"
 
 
 def _because(laps: Sequence[LapRecord]) -> str:

@@ -9,6 +9,7 @@ import msgspec
 
 from lira.hal.errors import ConfigError
 from lira.hal.messages import Applied, Reason, SessionState, Source
+from lira.hal.words import plural
 from lira.tools.operator.situation import URGENCY, Situation, Urgency, lost_devices, situation_of, standing_of
 from lira.tools.operator.view import View
 
@@ -78,7 +79,7 @@ def progress_words(session: SessionState) -> str:
         f"hit {session.collisions}, lost {session.lost}",
         f"{session.alone:.0%} without you",
         f"calls answered: {session.answered} of {session.calls}",
-        f"{session.labels} labels of yours",
+        f"{plural(session.labels, 'label')} of yours",
     ]
     if session.shown:
         parts.append(f"alone: {session.proven} of {session.shown}")

@@ -14,6 +14,7 @@ import msgspec
 
 from lira.hal.config import MALFORMED, read_bounded
 from lira.hal.errors import ConfigError, StorageError
+from lira.hal.words import plural
 from lira.tools.bench import Row
 
 SPEEDS, COST = ("real_time_factor", "speedup"), "ratio"  # parts of names: more of these is better, and less of this
@@ -62,7 +63,7 @@ def worse(now: Entry, before: Sequence[Entry]) -> list[str]:
             continue
         median = statistics.median(past)
         if value < median * (1 - WORSE) if _is_speed(name) else value > median * (1 + WORSE):
-            lines.append(f"{name}: {value:.3g}, and {median:.3g} in the median of {len(past)} runs before")
+            lines.append(f"{name}: {value:.3g}, and {median:.3g} in the median of {plural(len(past), 'run')} before")
     return lines
 
 

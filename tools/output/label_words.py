@@ -10,6 +10,7 @@ from collections.abc import Mapping
 
 from lira.fusion.log.run_log import ResultRecord
 from lira.hal.messages import Driver, LabelCounts
+from lira.hal.words import plural
 
 
 def by_source(counts: Mapping[str, int]) -> str:
@@ -23,7 +24,7 @@ def learned_words(result: ResultRecord) -> str:
     sources = f" ({by_source(stored)})" if result.buffer else ""
     choices = result.human_labels - stored.get(Driver.HUMAN, 0)
     chosen = f", {choices} of them a choice of who drives" if choices > 0 else ""
-    return f"{result.buffer} labels learned{sources}; human labels: {result.human_labels}{chosen}"
+    return f"{plural(result.buffer, 'label')} learned{sources}; human labels: {result.human_labels}{chosen}"
 
 
 def so_far_words(counts: LabelCounts) -> str:

@@ -4,6 +4,7 @@ import math
 from collections.abc import Callable, Sequence
 
 from lira.fusion.log.run_log import UNPROVEN, ContradictionRecord, LapRecord, ResultRecord
+from lira.hal.words import plural
 
 HALVINGS = 60
 
@@ -16,10 +17,10 @@ def share(passed: int, laps: int, level: float = 0.95) -> tuple[float, float]:
     return low, high
 
 
-def share_words(passed: int, laps: int, what: str = "unseen layouts") -> str:
+def share_words(passed: int, laps: int, what: str = "unseen layout", how: str = "") -> str:
     """Like: 12 of 12 unseen layouts; 95 %: 74 to 100 %."""
     low, high = share(passed, laps)
-    return f"{passed} of {laps} {what}; 95 %: {100 * low:.0f} to {100 * high:.0f} %"
+    return f"{passed} of {plural(laps, what)}{how}; 95 %: {100 * low:.0f} to {100 * high:.0f} %"
 
 
 def proof_words(result: ResultRecord) -> str:
@@ -28,9 +29,11 @@ def proof_words(result: ResultRecord) -> str:
         return "taught by hand; nothing was proven: that takes lira teach"
     kind, _, count = result.proof.partition(":")
     passed, of, shown = count.partition("/")
-    fresh = f"{passed} of {shown} fresh layouts" if of else f"{passed} fresh layouts in a row"
-    what = fresh if kind == "fresh" else "the layout it was taught on"
-    laps = f"{result.laps} training lap{'s' if result.laps != 1 else ''}"
+    what = "the layout it was taught on"
+    if kind == "fresh":
+        fresh = plural(int(shown or passed), "fresh layout")
+        what = f"{passed} of {fresh}" if of else f"{fresh} in a row"
+    laps = plural(result.laps, "training lap")
     if result.converged:
         return f"proven after {laps}: the novice alone passed {what}"
     return f"not proven within {laps}: the novice alone did not pass {what}"

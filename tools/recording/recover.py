@@ -8,6 +8,7 @@ from mcap.records import Attachment, Channel, Footer, Message, Metadata, Schema
 from mcap.writer import CompressionType, Writer
 
 from lira.hal.bus.topics import LATCHED_KEYS
+from lira.hal.words import plural
 from lira.tools.recording.bag import BagFile, write_bag
 from lira.tools.recording.layout import ATTACHMENT_KEY, BAG, PROFILE, files_of
 from lira.tools.recording.reader import Recording
@@ -28,7 +29,7 @@ def recover(path: Path) -> Iterator[str]:
             latched = topic.removeprefix(f"/{recording.head.robot}/") in LATCHED_KEYS
             found.note(topic, ros_type, log_ns, latched=latched)
         bag.append(found)
-        yield f"{each}: {'whole' if records is None else 'mended'}, {_heard(found)} messages"
+        yield f"{each}: {'whole' if records is None else 'mended'}, {plural(_heard(found), 'message')}"
     if path.is_dir():
         write_bag(files[0].parent, bag, Recording(files[0]).head)
         yield f"{files[0].parent / BAG} written"

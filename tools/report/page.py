@@ -12,6 +12,7 @@ import numpy as np
 
 from lira.fusion.log.run_log import UNPROVEN
 from lira.hal.messages import Call, Driver, Phase
+from lira.hal.words import plural
 from lira.tools.output.proven import contradiction_words, proof_words, unseen_words
 from lira.tools.report import plots
 from lira.tools.report.answers import COLUMNS as ANSWER_COLUMNS
@@ -91,7 +92,7 @@ def figures(run: Run) -> Iterable[tuple[str, str]]:
         result = run.result
         yield "human labels", str(result.human_labels)
         yield "labels learned", str(result.buffer)
-        yield "demonstration", f"{result.demonstration} labels"
+        yield "demonstration", plural(result.demonstration, "label")
         yield "interventions", str(result.interventions)
         yield "calls", str(result.calls)
         yield "training steps", str(result.training_steps)
@@ -222,8 +223,8 @@ def densities(run: Run) -> str:
     labels = run.labels()
     colours = "".join(
         [
-            key(f"human ({len(labels['human'])} labels)", "var(--human)"),
-            key(f"experts ({len(labels['expert'])} labels)", "var(--e3)"),
+            key(f"human ({plural(len(labels['human']), 'label')})", "var(--human)"),
+            key(f"experts ({plural(len(labels['expert']), 'label')})", "var(--e3)"),
         ]
     )
     linear = plots.density(labels, 0, "Linear velocity", ("-1: full speed back", "1: full speed ahead"))
@@ -248,7 +249,7 @@ def pictures(run: Run) -> str:
             f"<figcaption>{escape(step.decision.call)}<br>"
             f'<span class="muted">lap {lap.number}, {when}</span></figcaption></figure>'
         )
-    note = f"The camera's 32x32 gray image, as the networks get it. {len(chosen)} of {len(calls)} calls."
+    note = f"The camera's 32x32 gray image, as the networks get it. {len(chosen)} of {plural(len(calls), 'call')}."
     if not figures:
         return section("What it saw when it called", "It never called.", "")
     return section("What it saw when it called", note, f'<div class="calls">{"".join(figures)}</div>')

@@ -28,6 +28,7 @@ from lira.fusion.teaching.teacher import ScriptedTeacher
 from lira.hal.errors import LiraError
 from lira.hal.messages import Action, Driver
 from lira.hal.profile import RobotProfile, load_profile
+from lira.hal.words import plural
 from lira.sim_backend.catalogue import load_world
 from lira.sim_backend.foresight import Foresight, with_small_camera
 from lira.sim_backend.scenes.opening import quickest
@@ -59,14 +60,15 @@ def train_expert(kind: str, task: str, profile: RobotProfile, seed: int, path: P
         session = Session(robot, robot.arena, Journal(write=telling(say)), HgDagger(novice))
         proven = session.teach(Anew(course, seed) if course.proofs else Same(course.drives), teacher, course.laps)
     if not proven:
-        asked = f"{course.proofs} fresh laps in a row" if course.proofs else "the lap that was taught"
-        what = f"after {course.laps} laps the {kind} expert of '{task}' does not pass {asked}; nothing was saved"
-        raise LiraError(what, "Try another seed.")
+        asked = f"{plural(course.proofs, 'fresh lap')} in a row" if course.proofs else "the lap that was taught"
+        what = f"after {plural(course.laps, 'lap')} the {kind} expert of '{task}' does not pass {asked}"
+        raise LiraError(f"{what}; nothing was saved", "Try another seed.")
     expert = novice.frozen()
     cruise = measure_cruise(expert, profile, course)
     about = Checkpoint.of(expert, profile.name, command, seed, cruise)
     save_checkpoint(path, expert, replace(about, labels=novice.stored, training_steps=novice.training_steps))
-    print(f"{kind} expert: {novice.stored} labels learned, {novice.training_steps} training steps, saved to {path}")
+    took = f"{plural(novice.stored, 'label')} learned, {plural(novice.training_steps, 'training step')}"
+    print(f"{kind} expert: {took}, saved to {path}")
 
 
 def provide(pair: str) -> None:

@@ -13,6 +13,7 @@ from lira.fusion.methods.base import Method
 from lira.fusion.operator_service import Job
 from lira.hal.errors import ConfigError
 from lira.hal.profile import RobotProfile
+from lira.hal.words import plural
 from lira.tools.output.proven import contradiction_words
 from lira.tools.runs.names import LABELS, NOVICE, RECORD
 
@@ -40,14 +41,15 @@ def snapshot(
     def write() -> str:
         sync()
         if steps == 0:
-            return f"saved {labels} labels learned in {folder}; there is no novice yet"
+            return f"saved {plural(labels, 'label')} learned in {folder}; there is no novice yet"
         if network is None:
-            return f"saved {labels} labels learned in {folder}; this method's novice has no network to save"
+            return f"saved {plural(labels, 'label')} learned in {folder}; this method's novice has no network to save"
         about = Checkpoint.of(network, profile.name, head.command, head.seed)
         about = replace(about, labels=labels, training_steps=steps)
         save_checkpoint(folder / NOVICE, network, about)
         doubtful = contradiction_words(in_the_log(folder / LABELS, aside))
-        saved = f"saved {labels} labels learned, and the novice after {steps} training steps, in {folder}"
+        taught = plural(steps, "training step")
+        saved = f"saved {plural(labels, 'label')} learned, and the novice after {taught}, in {folder}"
         return "\n".join(filter(None, [saved, doubtful]))
 
     return write

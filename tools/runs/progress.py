@@ -13,6 +13,7 @@ from lira.fusion.log.run_log import LapRecord, Record, ResultRecord, RunRecord, 
 from lira.hal.config import MALFORMED
 from lira.hal.errors import StorageError
 from lira.hal.messages import Call, Decision, MethodCalls, Phase
+from lira.hal.words import plural
 from lira.tools.output.label_words import so_far_words
 from lira.tools.output.lap_names import lap_name
 from lira.tools.output.proven import proof_words
@@ -89,7 +90,7 @@ class Progress:
         if decision.call != Call.NONE:
             words.append(f"{decision.call} call")
         words.append(so_far_words(decision.labels))
-        words.append(f"{decision.interventions} interventions, {decision.calls} calls")
+        words.append(f"{plural(decision.interventions, 'intervention')}, {plural(decision.calls, 'call')}")
         elapsed_s = self._newest.elapsed_s - self._first.elapsed_s
         if elapsed_s > 1.0:
             words.append(f"{(decision.stamp_s - self._first.decision.stamp_s) / elapsed_s:.0f}x real time")

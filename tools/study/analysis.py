@@ -5,6 +5,7 @@ from html import escape
 from itertools import combinations
 from statistics import median
 
+from lira.hal.words import plural
 from lira.tools.experiments.effort.statistics import median_interval
 from lira.tools.output.proven import share_words
 from lira.tools.report.page import section, styled
@@ -29,7 +30,7 @@ def render(title: str, rows: Sequence[BlockRow]) -> str:
     """Return the page."""
     methods = list(dict.fromkeys(row.method for row in rows))
     people = {row.participant for row in rows}
-    body = f"<h1>{escape(title)}</h1><p>{len(people)} participants, {len(rows)} blocks.</p>"
+    body = f"<h1>{escape(title)}</h1><p>{plural(len(people), 'participant')}, {plural(len(rows), 'block')}.</p>"
     groups = {name: [row for row in rows if row.method == name] for name in methods}
     body += section("By method", "Medians; passed: the proof, with its interval.", table(*_by_method(groups)))
     note = "Median of the differences within people, second minus first, with the 95 % interval of a bootstrap."
@@ -40,7 +41,7 @@ def render(title: str, rows: Sequence[BlockRow]) -> str:
 def _by_method(groups: Mapping[str, Sequence[BlockRow]]) -> tuple[list[str], list[list[str]]]:
     lines = []
     for name, rows in groups.items():
-        cells = [name, share_words(sum(row.passed for row in rows), len(rows), "passed")]
+        cells = [name, share_words(sum(row.passed for row in rows), len(rows), "block", " passed")]
         for measure in MEASURES:
             values = [value for row in rows if (value := getattr(row, measure)) is not None]
             cells.append(f"{median(values):.1f}" if values else "")

@@ -13,6 +13,7 @@ from datetime import UTC, datetime
 from pathlib import Path
 
 from lira.hal.bus.security.keys import CERTIFICATE, Keys
+from lira.hal.words import plural
 
 SOON_DAYS = 7
 DAY_S = 86400.0
@@ -54,7 +55,7 @@ def reminder(name: str, ends: datetime, now: datetime) -> str:
     days = (ends - now).days
     if days > SOON_DAYS:
         return ""
-    when = f"ended on {ends:%Y-%m-%d}" if ends <= now else f"ends on {ends:%Y-%m-%d}, in {days} days"
+    when = f"ended on {ends:%Y-%m-%d}" if ends <= now else f"ends on {ends:%Y-%m-%d}, in {plural(days, 'day')}"
     return (
         f"the certificate of '{name}' {when}. Renew it where the keys were made, with: lira keys renew {name}; "
         f"and copy its {CERTIFICATE} here"

@@ -19,6 +19,7 @@ from lira.fusion.log.label_log import Demonstration, DemonstrationLog, read_demo
 from lira.fusion.preprocess import Features, shapes_of
 from lira.hal.errors import StorageError
 from lira.hal.profile import Depth, load_profile
+from lira.hal.words import plural
 
 SIM = load_profile("thesis-sim")
 REAL = load_profile("rosbot2")
@@ -241,7 +242,7 @@ def test_a_file_that_cannot_grow_is_reported_keeps_whole_records_and_goes_on_whe
     assert [k for k, _, _ in errors] == list(range(errors[0][0], 20))
     assert 0 < errors[0][0] < 20
     for number, (_, message, length) in enumerate(errors, start=1):
-        assert f"File too large; {number} labels wait in memory" in message
+        assert f"File too large; in memory: {plural(number, 'label')}" in message
         assert length == path.stat().st_size - size * len(errors)  # the partial write was taken back
     assert holds(path, range(20))
 

@@ -86,7 +86,7 @@ def test_opening_a_damaged_log_says_what_is_lost_and_keeps_the_old_file(tmp_path
         opened.append(demonstration(COUNT))
     kept = tmp_path / "log.damaged"
     assert said == [
-        f"{path}: {size - 1} bytes cannot be read (at byte {begin + 2 * size}); {COUNT - 1} labels are read, "
+        f"{path}: {size - 1} bytes cannot be read (at byte {begin + 2 * size}); {COUNT - 1} labels read, "
         f"the old file is kept as {kept}"
     ]
     assert kept.read_bytes() == broken

@@ -111,7 +111,7 @@ def test_an_outcome_of_other_code_is_played_again_and_says_so(world, tmp_path, c
     assert first.fingerprint
     keep(msgspec.structs.replace(first, fingerprint="0" * 16, labels={}), tmp_path)
     (second,) = run_trials([trial], tmp_path, Here(1))
-    assert "1 kept trials are of other code" in capsys.readouterr().err
+    assert "1 kept trial of other code" in capsys.readouterr().err
     assert timeless(second) == timeless(first)
     assert kept(trial, tmp_path) == second
 

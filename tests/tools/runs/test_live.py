@@ -424,7 +424,7 @@ def test_on_a_floor_the_person_judges(tmp_path):
     assert [each.passed for each in judged] == [False, True]
     assert session.converged
     verdicts = [(state.words, state.converged) for state in told if state.stage is Stage.VERDICT]
-    assert verdicts[0][0].startswith("It drove 0 of 1 times as you wanted")
+    assert verdicts[0][0].startswith("It drove 0 of 1 time as you wanted")
     assert [converged for _, converged in dict.fromkeys(verdicts)] == [False, True]
 
 
@@ -459,7 +459,7 @@ def test_the_last_interventions_labels_are_taken_back_and_unlearned(held):
     with Classroom(plan, load_profile("thesis-sim"), "line", InlineTrainer, print) as room:
         ledger, stored = Ledger(), room.method.novice.stored
         ledger.go_on(LabelCounts(stored_human=5), 0, 0)
-        assert room.undo(ledger) == (True, "the 3 labels of the last intervention are not learned any more")
+        assert room.undo(ledger) == (True, "not learned any more: 3 labels of the last intervention")
         assert room.method.novice.stored == stored - 3
         assert ledger.labels.stored_human == 2
 

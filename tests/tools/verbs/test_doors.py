@@ -182,7 +182,7 @@ def test_an_experiment_and_a_method_of_ones_own_are_played_and_kept(lab, capsys)
     assert "short" not in capsys.readouterr().err  # nothing was played again
     (lab / "doorlab.py").write_text(LAB + "# changed\n")
     assert cli.main(["experiment", *words]) == 0
-    assert "1 kept trials are of other code" in capsys.readouterr().err
+    assert "1 kept trial of other code" in capsys.readouterr().err
 
 
 def test_an_experiment_that_is_none_is_refused(lab, capsys):

@@ -5,6 +5,7 @@ from pathlib import Path
 
 from lira.hal.config import load_toml, write_whole
 from lira.hal.errors import ConfigError, StorageError
+from lira.hal.words import plural
 from lira.tools.experiments.experiment import Finding, Row
 from lira.tools.experiments.output.lead import LED_BY, NOT_YET, lead
 from lira.tools.experiments.output.markdown import table
@@ -79,7 +80,7 @@ def overview(summary: Summary, link: str) -> Row:
 
 def chapter(summary: Summary, causes: Mapping[str, str]) -> str:
     """Everything about one experiment."""
-    parts = [f"# {summary.name}\n", f"{summary.words}. `{summary.command}`: {summary.trials} trials."]
+    parts = [f"# {summary.name}\n", f"{summary.words}. `{summary.command}`: {plural(summary.trials, 'trial')}."]
     for each in summary.tables:
         parts += [f"\n{each.title}:\n", table(each.rows)]
         parts += [each.note] if each.note else []

@@ -6,6 +6,7 @@ from itertools import chain
 from pathlib import Path
 
 from lira.hal.config import write_whole
+from lira.hal.words import plural
 from lira.tools.bench import cell
 from lira.tools.experiments.effort.pairs import TOTAL
 from lira.tools.experiments.experiment import Picture, Row
@@ -71,7 +72,7 @@ def lead(summaries: Sequence[Summary]) -> str:
         return HEAD + NOT_YET
     here = (ALL_WAYS, *TAUGHT_ON, RIVALS)
     elsewhere = [each for name, each in found.items() if name.startswith(f"{LED_BY}-") and name not in here]
-    played = f"{main.trials} trials{played_with(main)}"
+    played = f"{plural(main.trials, 'trial')}{played_with(main)}"
     parts = [
         HEAD,
         f"\n`{main.command}`: {played}; all tables are in [unseen](docs/results/unseen.md).\n{EFFORT}\n",

@@ -10,6 +10,7 @@ from pathlib import Path
 import matplotlib as mpl
 
 from lira.hal.errors import StorageError
+from lira.hal.words import plural
 from lira.tools.bench import cell, columns
 from lira.tools.experiments.experiment import Finding, Picture, Row
 from lira.tools.experiments.output.summary import Summary
@@ -57,7 +58,7 @@ def figure(picture: Picture, svg: bytes) -> str:
 def document(summary: Summary, figures: Sequence[str]) -> str:
     """Return the whole page."""
     name = summary.name
-    facts = f"{summary.command}: {summary.trials} trials"
+    facts = f"{summary.command}: {plural(summary.trials, 'trial')}"
     style = (resources.files("lira.tools") / "report" / "page.css").read_text(encoding="utf-8")
     parts = [f'<h1>{escape(name)}: {escape(summary.words)}</h1><p class="muted">{escape(facts)}</p>']
     parts += [section(table.title, table.note, html_table(table.rows)) for table in summary.tables]

@@ -8,6 +8,7 @@ from typing import Self
 import msgspec
 from tqdm import tqdm
 
+from lira.hal.words import plural
 from lira.tools.experiments.playing.fingerprint import fingerprint
 from lira.tools.experiments.playing.kept import keep, kept
 from lira.tools.experiments.trial import Outcome, Trial
@@ -36,7 +37,8 @@ def run_trials(trials: Sequence[Trial], folder: Path, pool: Pool) -> list[Outcom
         else:
             outdated += 1
     if outdated:
-        print(f"{outdated} kept trials are of other code or other experts: played again", file=sys.stderr, flush=True)
+        of_others = f"{plural(outdated, 'kept trial')} of other code or other experts"
+        print(f"{of_others}: played again", file=sys.stderr, flush=True)
     missing = [trial for trial in different if trial not in done]
     with Bar(len(different), len(done)) as bar:
         for played in pool(missing) if missing else ():
@@ -71,8 +73,9 @@ class Bar:
 def line(outcome: Outcome) -> str:
     """How a trial ended, in one line."""
     trial, result = outcome.trial, outcome.result
-    how = f"converged after {result.laps} laps" if result.converged else f"not converged in {result.laps} laps"
+    how = f"{'converged after' if result.converged else 'not converged in'} {plural(result.laps, 'lap')}"
+    asked = f"{plural(result.human_labels, 'human label')}, {plural(result.interventions, 'intervention')}"
     return (
         f"{Path(trial.world).stem} {trial.method.name} {trial.teacher} seed {trial.seed}: {how}, "
-        f"{result.human_labels} human labels, {result.interventions} interventions; {result.elapsed_s:.0f} s"
+        f"{asked}; {result.elapsed_s:.0f} s"
     )

@@ -15,6 +15,7 @@ from lira.fusion.methods.base import Method
 from lira.fusion.operator_service import Job, OperatorService
 from lira.fusion.service import serve
 from lira.hal.client.remote import RemoteRobot
+from lira.hal.words import plural
 from lira.tools.launch.lifetime import saving, stop_or_interrupt
 from lira.tools.launch.notify import Notifier
 from lira.tools.live.before import days_before
@@ -82,7 +83,7 @@ def _lesson(
         )
         service.begin()
         how = PAUSED if args.paused else "hold the dead-man to drive"
-        words = f"{args.method} learns on '{args.name}' with {novice.stored} labels; {how}"
+        words = f"{args.method} learns on '{args.name}' with {plural(novice.stored, 'label')}; {how}"
         say(words)
         notifier.ready(words)
         with contextlib.closing(service):

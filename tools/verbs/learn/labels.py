@@ -29,6 +29,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from lira.hal.errors import ConfigError
+from lira.hal.words import plural
 from lira.tools.options import add_json
 from lira.tools.runs.names import LABELS, in_run
 
@@ -69,7 +70,7 @@ def run(args: argparse.Namespace) -> int:
     """Do it, and say what came of it."""
     needed = 2 if args.what == "merge" else 1
     if len(args.file) != needed:
-        raise ConfigError(f"{args.what} takes {needed} log{'s' * (needed > 1)}", "See: lira labels --help")
+        raise ConfigError(f"{args.what} takes {plural(needed, 'log')}", "See: lira labels --help")
     given = [option for name, option in OPTIONS.items() if getattr(args, name) not in (None, (), False)]
     useless = [option for option in given if option not in TAKES[args.what]]
     if useless:
@@ -95,7 +96,7 @@ def list_labels(args: argparse.Namespace) -> int:
     except LiraError:
         aside = {}  # no novice is there that could tell
     rows = [row for number, row in enumerate(list_rows(labels, aside)) if number in shown]
-    head = f"{len(labels)} labels given, {sum(label.stored for label in labels)} of them learned"
+    head = f"{plural(len(labels), 'label')} given, {sum(label.stored for label in labels)} of them learned"
     head += "" if wanted.nothing else f"; here {len(rows)} of them"
     return tell(args, {"file": str(path), "labels": rows}, f"{head}\n\n{list_table(rows)}")
 
@@ -116,7 +117,7 @@ def undo(args: argparse.Namespace) -> int:
     changed = correct(path, found, stored=again)
     numbers = [number for number in found if (labels[number].undone if again else labels[number].stored)]
     what = "learned again" if again else "taken back"
-    lines = [f"{what}: {len(changed)} label{'s' * (len(changed) != 1)} {ranges(numbers)}".rstrip()]
+    lines = [f"{what}: {plural(len(changed), 'label')} {ranges(numbers)}".rstrip()]
     if not found:
         lines.append("no label of this log is taken back")
     lines += unchanged(labels, [number for number in found if number not in set(numbers)])
@@ -167,10 +168,8 @@ def merge(args: argparse.Namespace) -> int:
     one, other = args.file
     count, both = label_edit.merge(one, other, args.output)
     twice = f"; {both} of them are in both, and kept once" if both else ""
-    words = (
-        f"{args.output}: {count} labels given{twice}\nto go on with them: put it into a folder as labels.lira, then "
-    )
-    words += "lira fusion --method NAME --run DIR"
+    words = f"{args.output}: {plural(count, 'label')} given{twice}\nto go on with them: put it into a folder as "
+    words += "labels.lira, then lira fusion --method NAME --run DIR"
     return tell(args, {"file": str(args.output), "labels": count, "in_both": both}, words)
 
 
@@ -253,7 +252,8 @@ def row(path: Path, found: "Survey", kept: Path | None) -> dict[str, Any]:
 
 def words(path: Path, found: "Survey", kept: Path | None) -> str:
     """What was found, for a person."""
-    lines = [f"{path}: {found.count} labels given, of '{found.form.profile}' in {found.newest_run + 1} run(s)"]
+    given, runs = plural(found.count, "label"), plural(found.newest_run + 1, "run")
+    lines = [f"{path}: {given} given, of '{found.form.profile}' in {runs}"]
     if not found.words():
         lines.append("  nothing is damaged")
     else:

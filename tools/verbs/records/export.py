@@ -17,6 +17,8 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from lira.hal.words import plural
+
 if TYPE_CHECKING:
     from lira.tools.export.run import RecordedRun
 
@@ -58,7 +60,8 @@ def run(args: argparse.Namespace) -> int:
     count = sum(map(len, found.tables))
     kept = sum(int(table["in_buffer"].values.sum()) for table in found.tables)
     by = f"by {found.labels}" if found.labels else "by the recording's counts"
-    print(f"written: {args.out}: {len(found.tables)} episodes, {count} steps; {kept} of them are labels learned, {by}")
+    all_of_it = f"{plural(len(found.tables), 'episode')}, {plural(count, 'step')}"
+    print(f"written: {args.out}: {all_of_it}; labels learned: {kept}, {by}")
     return 0
 
 

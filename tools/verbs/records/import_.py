@@ -14,6 +14,7 @@ examples:
 import argparse
 from pathlib import Path
 
+from lira.hal.words import plural
 from lira.tools.options import add_profile
 
 ROLES = ("scan", "camera", "command")
@@ -62,5 +63,5 @@ def run(args: argparse.Namespace) -> int:
     tally = keep(shown, path, profile)
     cut = f"; {tally.clipped} of them were more than the robot can do, and are cut" if tally.clipped else ""
     without = f"; {tally.without} without an action are left out" if tally.without else ""
-    print(f"{tally.taken.total()} labels ({by_source(tally.taken)}) are in {path}, to be learned{cut}{without}")
+    print(f"in {path}, to be learned: {plural(tally.taken.total(), 'label')} ({by_source(tally.taken)}){cut}{without}")
     return 0

@@ -16,6 +16,7 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from lira.hal.words import plural
 from lira.tools.options import add_json
 
 if TYPE_CHECKING:
@@ -47,7 +48,7 @@ def words(summary: "Summary") -> str:
     began = datetime.fromtimestamp(summary.began_ns / 1e9, UTC).astimezone()
     where = f"world '{summary.world}'" if summary.world else "a floor"
     many = f"{len(summary.files)} files" if len(summary.files) > 1 else f"{summary.files[0]}"
-    size = f"{summary.count} messages, {summary.bytes / 1e6:.1f} MB"
+    size = f"{plural(summary.count, 'message')}, {summary.bytes / 1e6:.1f} MB"
     lines = [
         f"robot '{summary.robot}' ({summary.profile}) in {where}, {summary.mode}, recorded {began:%Y-%m-%d %H:%M:%S}",
         f"{summary.duration_s:.1f} s of the robot's time, {size}, {many}",
@@ -72,7 +73,7 @@ def words(summary: "Summary") -> str:
         total = summary.drivers.total()
         shares = ", ".join(f"{driver} {count / total:.0%}" for driver, count in summary.drivers.most_common())
         calls = ", ".join(f"{count} {call}" for call, count in summary.calls.most_common())
-        lines.append(f"{total} decisions: {shares}; calls: {calls or 'none'}")
+        lines.append(f"{plural(total, 'decision')}: {shares}; calls: {calls or 'none'}")
     if summary.lost:
         lost = ", ".join(f"{count} of {key}" for key, count in summary.lost.items())
         lines.append(f"the recorder lost: {lost}")

@@ -19,6 +19,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from lira.hal.errors import ConfigError
+from lira.hal.words import plural
 from lira.tools.options import DEFAULT, add_server
 
 if TYPE_CHECKING:
@@ -82,7 +83,7 @@ def tell(args: argparse.Namespace, recording: "Recording", stop: threading.Event
             player.step(stop, ask, args.since)
         else:
             player.run(stop, args.since)
-        say(f"told {player.told} messages")
+        say(f"told {plural(player.told, 'message')}")
     finally:
         bus.close()
 

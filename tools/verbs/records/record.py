@@ -19,6 +19,7 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from lira.hal.words import plural
 from lira.tools.options import DEFAULT, add_client, natural
 
 if TYPE_CHECKING:
@@ -81,5 +82,5 @@ def record(args: argparse.Namespace, stop: "Event") -> int:
         notifier.ready(words)
         recorder.run(stop, heard, notifier.alive)
     lost = recorder.lost.total()
-    say(f"recorded {recorder.count} messages, {writer.size_bytes / 1e6:.1f} MB, lost {lost}: {folder}")
+    say(f"recorded {plural(recorder.count, 'message')}, {writer.size_bytes / 1e6:.1f} MB, lost {lost}: {folder}")
     return 0

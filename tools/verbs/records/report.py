@@ -9,6 +9,7 @@ import argparse
 from pathlib import Path
 
 from lira.hal.errors import ConfigError
+from lira.hal.words import plural
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -31,5 +32,5 @@ def run(args: argparse.Namespace) -> int:
         case [one, other]:
             print(write_comparison((one, other), args.to or one / COMPARISON))
         case _:
-            raise ConfigError(f"{len(folders)} runs do not fit beside each other", "Name one or two.")
+            raise ConfigError(f"{plural(len(folders), 'run')} do not fit beside each other", "Name one or two.")
     return 0

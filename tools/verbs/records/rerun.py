@@ -18,6 +18,7 @@ import time
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from lira.hal.words import plural
 from lira.tools.options import add_json
 
 SHOWN = 3  # differences: what comes after the first follows from it
@@ -80,12 +81,13 @@ def words(again: "Again", took_s: float) -> list[str]:
     if again.identical:
         assert again.final is not None
         final = again.final
-        what = f"{len(again.proposed)} decisions, {final.labels} labels learned, {final.steps} training steps"
+        what = f"{plural(len(again.proposed), 'decision')}, {plural(final.labels, 'label')} learned"
+        what += f", {plural(final.steps, 'training step')}"
         what += f", novice {final.weights[:12]}" if final.weights else ""
         return [f"identical: {what} by '{name}'; {trace.seconds:.0f} s in {took_s:.1f} s"]
     lines = [f"'{name}' does not do the same:"]
     if trace.missing:
-        lines.append(f"  {trace.missing} messages of its calls were not recorded")
+        lines.append(f"  not recorded: {plural(trace.missing, 'message')} of its calls")
     for each in again.differences[:SHOWN]:
         lines.append(f"  at {each.time_s:.2f} s, call {each.number} ({each.name})")
         lines += [f"    was {each.was}", f"    now {each.now}"]
@@ -123,7 +125,7 @@ def table(otherwise: "Otherwise", was: str, now: str) -> list[str]:
             f"{first.now_driver} would have (call: {first.now_call})"
         )
     if otherwise.alone:
-        lines.append(f"alone, it would have turned otherwise in {otherwise.aside} of {otherwise.alone} steps")
+        lines.append(f"alone, it would have turned otherwise in {otherwise.aside} of {plural(otherwise.alone, 'step')}")
     return lines
 
 

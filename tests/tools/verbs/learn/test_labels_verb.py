@@ -30,7 +30,7 @@ def log(tmp_path):
 def test_a_whole_log(log, capsys):
     path, _, _ = log
     assert main(["labels", "check", str(path)]) == 0
-    assert capsys.readouterr().out == f"{path}: 100 labels given, of 'thesis-sim' in 1 run(s)\n  nothing is damaged\n"
+    assert capsys.readouterr().out == f"{path}: 100 labels given, of 'thesis-sim' in 1 run\n  nothing is damaged\n"
 
 
 def test_a_byte_taken_out_of_the_third_of_100_costs_one_label(log, capsys):
