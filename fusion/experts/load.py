@@ -91,6 +91,9 @@ def load_alone(
     if ask:
         if not isinstance(network, KernelNet):
             raise ConfigError(f"'{given}' cannot tell what it does not know", "A novice taught by plus can.")
+        if not network.proven:
+            what = f"'{given}' cannot tell what it does not know: it was not proven after its last label"
+            raise ConfigError(what, "Have it proven, as lira teach and lira demo do, or leave out --ask.")
         alone = Doubtful(expert.act, network.doubts)
     return Shielded(alone, Shield(profile)) if shield else alone
 

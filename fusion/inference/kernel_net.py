@@ -114,6 +114,11 @@ class KernelNet(DrivingNet):
         """Whether it knows less here than anywhere in the runs that proved it."""
         return self.deviation(seen)[1] > self._limit
 
+    @property
+    def proven(self) -> bool:
+        """Whether it was proven after its last label: without that it never doubts."""
+        return self._limit < NEVER
+
     def _prepare(self, weights: Weights) -> None:
         lengths, noise = weights["lengths"], weights["noise"]
         if min(*lengths, *noise) <= 0.0:

@@ -158,7 +158,14 @@ class VerdictRecord(msgspec.Struct, frozen=True, tag="verdict"):
     passed: bool
 
 
-Record = RunRecord | StepRecord | LapRecord | ResultRecord | VerdictRecord
+class EditRecord(msgspec.Struct, frozen=True, tag="edit"):
+    """How many labels were taken back, or learned again, after all that stands before it."""
+
+    taken_back: int = 0
+    learned_again: int = 0
+
+
+Record = RunRecord | StepRecord | LapRecord | ResultRecord | VerdictRecord | EditRecord
 
 
 class RunWriter:

@@ -10,7 +10,7 @@ from lira.fusion.learning.kernel_novice import KernelNovice
 from lira.fusion.learning.labels import Label
 from lira.fusion.learning.learned_policy import Contradiction
 from lira.fusion.log.label_log import read_demonstrations
-from lira.fusion.log.run_log import RunRecord, read_run
+from lira.fusion.log.run_log import EditRecord, RunRecord, RunWriter, read_run
 from lira.fusion.methods.presets import METHODS, Preset
 from lira.fusion.policies.kernel import KernelSettings
 from lira.hal.errors import ConfigError
@@ -46,6 +46,18 @@ def preset_of(folder: Path) -> Preset:
     """How the novice in a folder was taught, by its record; as by `plus` where there is none."""
     heads = [each for each in read_run(folder / RECORD) if isinstance(each, RunRecord)] if has(folder, RECORD) else []
     return METHODS.get(heads[-1].preset if heads else "plus", METHODS["plus"])
+
+
+def note(log: Path, count: int, *, stored: bool) -> str:
+    """Write into the record of a log's run that labels were changed, and say so; "" where there is none.
+
+    Raises `StorageError`.
+    """
+    if log.name != LABELS or not has(log.parent, RECORD):
+        return ""
+    with RunWriter(log.parent / RECORD) as record:
+        record.write(EditRecord(learned_again=count) if stored else EditRecord(taken_back=count))
+    return f"its report says so once it is made again: lira report {log.parent}"
 
 
 def rewrite(log: Path) -> str:

@@ -3,7 +3,7 @@
 import math
 from collections.abc import Callable, Sequence
 
-from lira.fusion.log.run_log import UNPROVEN, ContradictionRecord, LapRecord, ResultRecord
+from lira.fusion.log.run_log import UNPROVEN, ContradictionRecord, EditRecord, LapRecord, ResultRecord
 from lira.hal.words import plural
 
 HALVINGS = 60
@@ -37,6 +37,13 @@ def proof_words(result: ResultRecord) -> str:
     if result.converged:
         return f"proven after {laps}: the novice alone passed {what}"
     return f"not proven within {laps}: the novice alone did not pass {what}"
+
+
+def edit_words(edit: EditRecord) -> str:
+    """What was done to a run's labels after its proof, of which that says nothing; empty where nothing was."""
+    parts = [(edit.taken_back, "taken back"), (edit.learned_again, "learned again")]
+    said = " and ".join(f"{plural(count, 'label')} {what}" for count, what in parts if count)
+    return f"since then: {said}; the novice of what is left has not been proven" if said else ""
 
 
 def unseen_words(laps: Sequence[LapRecord]) -> str:

@@ -7,6 +7,7 @@ from pathlib import Path
 from msgspec import structs
 
 from lira.fusion.log.run_log import (
+    EditRecord,
     LapRecord,
     Record,
     ResultRecord,
@@ -19,6 +20,7 @@ from lira.hal.errors import StorageError
 from lira.hal.messages import Action, Driver, Phase
 from lira.tools.output.lap_names import lap_name
 
+UNTOUCHED = EditRecord()
 MOMENT_S = 2.0  # a lap of training that was cut off so soon was none: somebody asked for the proof
 
 
@@ -66,6 +68,7 @@ class Run:
     result: ResultRecord | None
     experts: tuple[str, ...]
     verdict: VerdictRecord | None = None  # the newest of a person's session
+    edited: EditRecord = UNTOUCHED  # what was done to its labels after its end
 
     def phase(self, name: str) -> list[Lap]:
         """Laps of one phase."""
@@ -92,6 +95,7 @@ class _Sorter:
     head: RunRecord | None = None
     result: ResultRecord | None = None
     verdict: VerdictRecord | None = None
+    edited: EditRecord = UNTOUCHED
     laps: list[Lap] = field(default_factory=list)
     steps: list[StepRecord] = field(default_factory=list)
     days: int = 0
@@ -114,13 +118,17 @@ class _Sorter:
                 )
             case VerdictRecord():
                 self.verdict = record
+            case EditRecord():
+                self.edited = EditRecord(
+                    self.edited.taken_back + record.taken_back, self.edited.learned_again + record.learned_again
+                )
 
     def begin_day(self, head: RunRecord) -> None:
         """A file that was appended to holds several days."""
         self.end_lap(None)
         if self.result is not None:
             self.times_s = self.result.simulated_s, self.result.elapsed_s
-        self.head, self.result, self.verdict = head, None, None
+        self.head, self.result, self.verdict, self.edited = head, None, None, UNTOUCHED
         self.days += 1
 
     def end_lap(self, record: LapRecord | None) -> None:
@@ -158,7 +166,7 @@ def digest(records: Iterable[Record]) -> Run:
     for lap in laps:
         for step in lap.steps[:1]:
             experts |= dict.fromkeys(view.name for view in step.decision.experts)
-    return Run(sorter.head, tuple(laps), sorter.result, tuple(experts), sorter.verdict)
+    return Run(sorter.head, tuple(laps), sorter.result, tuple(experts), sorter.verdict, sorter.edited)
 
 
 def blinded(run: Run, letter: str) -> Run:

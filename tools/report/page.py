@@ -13,7 +13,7 @@ import numpy as np
 from lira.fusion.log.run_log import UNPROVEN
 from lira.hal.messages import Call, Driver, Phase
 from lira.hal.words import plural
-from lira.tools.output.proven import contradiction_words, proof_words, unseen_words
+from lira.tools.output.proven import contradiction_words, edit_words, proof_words, unseen_words
 from lira.tools.report import plots
 from lira.tools.report.answers import COLUMNS as ANSWER_COLUMNS
 from lira.tools.report.answers import answer_cells, sum_up
@@ -77,6 +77,14 @@ def head(run: Run, title: str) -> str:
 
 def outcome(run: Run) -> tuple[str, str]:
     """One line for the end of the run, and its style."""
+    words, how = ended(run)
+    if since := edit_words(run.edited):
+        return f"{words}; {since}", "muted" if how == "good" else how
+    return words, how
+
+
+def ended(run: Run) -> tuple[str, str]:
+    """The same, whatever was done to its labels afterwards."""
     if run.verdict is not None:
         return run.verdict.words, "good" if run.verdict.passed else "bad"
     if run.result is None:

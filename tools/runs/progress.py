@@ -9,14 +9,14 @@ from typing import TextIO
 
 import msgspec
 
-from lira.fusion.log.run_log import LapRecord, Record, ResultRecord, RunRecord, StepRecord, VerdictRecord
+from lira.fusion.log.run_log import EditRecord, LapRecord, Record, ResultRecord, RunRecord, StepRecord, VerdictRecord
 from lira.hal.config import MALFORMED
 from lira.hal.errors import StorageError
 from lira.hal.messages import Call, Decision, MethodCalls, Phase
 from lira.hal.words import plural
 from lira.tools.output.label_words import so_far_words
 from lira.tools.output.lap_names import lap_name
-from lira.tools.output.proven import proof_words
+from lira.tools.output.proven import edit_words, proof_words
 
 Publish = Callable[[Decision | MethodCalls], None]
 Say = Callable[[str], None]
@@ -79,6 +79,8 @@ class Progress:
                 return result_line(record)
             case VerdictRecord():
                 return f"verdict: {record.words}"
+            case EditRecord():
+                return edit_words(record)
 
     def status(self) -> str:
         """Where the run is now, in one line; empty before the first step."""

@@ -106,7 +106,7 @@ def undo(args: argparse.Namespace) -> int:
     from lira.fusion.log.label_edit import correct, read_heads
     from lira.tools.labels.choose import choose
     from lira.tools.labels.numbers import ranges
-    from lira.tools.labels.relearn import rewrite
+    from lira.tools.labels.relearn import note, rewrite
     from lira.tools.labels.words import unchanged
 
     path, again = args.file[0], args.what == "redo"
@@ -122,7 +122,7 @@ def undo(args: argparse.Namespace) -> int:
         lines.append("no label of this log is taken back")
     lines += unchanged(labels, [number for number in found if number not in set(numbers)])
     if changed:
-        lines.append(rewrite(path))
+        lines += filter(None, [rewrite(path), note(path, len(changed), stored=again)])
     if changed and not again:
         lines.append(f"they stay in the log; to learn them again: lira labels redo {path} --number {ranges(numbers)}")
     return tell(args, {"file": str(path), "numbers": numbers, "stored": again}, "\n".join(lines))

@@ -6,18 +6,23 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from lira.fusion.inference.checkpoint import load_checkpoint
+from lira.fusion.experts.load import load_alone
+from lira.fusion.inference.checkpoint import load_checkpoint, save_checkpoint
 from lira.fusion.inference.kernel_net import KernelNet
 from lira.fusion.learning.kernel_novice import KernelNovice
 from lira.fusion.learning.labels import Label
 from lira.fusion.learning.novice import LearningSettings
 from lira.fusion.log.label_log import Demonstration, DemonstrationLog, read_demonstrations
-from lira.fusion.log.run_log import RunRecord, RunWriter
+from lira.fusion.log.run_log import ResultRecord, RunRecord, RunWriter, VerdictRecord
 from lira.fusion.policies.kernel import KernelSettings
 from lira.fusion.policies.networks import ExpertNet
 from lira.fusion.preprocess import Features
+from lira.hal.errors import ConfigError
 from lira.hal.profile import load_profile
 from lira.tools.cli import main
+from lira.tools.report import write_report
+from lira.tools.report.digest import load_run
+from lira.tools.report.page import outcome
 from lira.tools.runs.folder import snapshot
 from lira.tools.runs.names import LABELS, NOVICE, RECORD
 
@@ -105,6 +110,54 @@ def test_the_last_intervention_is_taken_back_and_the_novice_knows_it_no_more(fol
     status, said = lira(capsys, "redo", folder / LABELS)
     assert said.out.splitlines()[0] == "learned again: 3 labels 7-9"
     assert turn(folder, 0) == pytest.approx(before, abs=1e-3)
+
+
+PROVEN = ResultRecord(True, 1, 5, 0, 2, 3, 10, 10, 60.0, 6.0, proof="fresh:3")
+
+
+def ended(folder, *records):
+    """Let a run end with these; return what its report says of that."""
+    with RunWriter(folder / RECORD) as record:
+        for each in records:
+            record.write(each)
+    return outcome(load_run(folder / RECORD))
+
+
+def test_a_report_says_that_labels_were_taken_back_since_it_was_proven(folder, capsys):
+    proven = "Proven after 1 training lap: the novice alone passed 3 fresh layouts in a row"
+    assert ended(folder, PROVEN) == (proven, "good")
+    assert f"lira report {folder}" in lira(capsys, "undo", folder)[1].out
+    since = f"{proven}; since then: 3 labels taken back; the novice of what is left has not been proven"
+    assert ended(folder) == (since, "muted")
+    assert since in write_report(folder).read_text()
+    lira(capsys, "redo", folder, "--number", "7")
+    assert "since then: 3 labels taken back and 1 label learned again; the novice" in ended(folder)[0]
+    assert ended(folder, HEAD, PROVEN) == (proven, "good")
+
+
+def test_a_verdict_is_of_the_labels_that_there_were(folder, capsys):
+    said = "It drove 12 of 12 unseen layouts"
+    assert ended(folder, PROVEN, VerdictRecord("ada", said, True)) == (said, "good")
+    lira(capsys, "undo", folder, "--number", "2")
+    assert ended(folder)[0] == f"{said}; since then: 1 label taken back; the novice of what is left has not been proven"
+
+
+def test_nothing_is_noted_where_nothing_changed_or_there_is_no_run(folder, capsys):
+    lira(capsys, "redo", folder)
+    assert ended(folder, PROVEN)[1] == "good"
+    (folder / RECORD).unlink()
+    assert lira(capsys, "undo", folder)[0] == 0
+    assert not (folder / RECORD).exists()
+
+
+def test_a_novice_that_was_not_proven_since_does_not_claim_to_know_what_it_does_not(folder, capsys):
+    network, about = load_checkpoint(folder / NOVICE)
+    proven = KernelNet(network.architecture, network.weights() | {"limit": np.ones(1, np.float32)})
+    save_checkpoint(folder / NOVICE, proven, about)
+    assert load_alone(f"{folder / NOVICE}", SIM, ask=True)
+    lira(capsys, "undo", folder)
+    with pytest.raises(ConfigError, match="was not proven after its last label"):
+        load_alone(f"{folder / NOVICE}", SIM, ask=True)
 
 
 def test_labels_are_taken_back_by_number_by_source_and_by_time(folder, capsys):
