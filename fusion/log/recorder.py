@@ -39,8 +39,7 @@ class Journal:
         self._began_s = time.monotonic()
         self._call = Call.NONE
         self._given = 0  # labels handed to the log
-        self._learned: list[tuple[int, int, float]] = []  # of those stored: place in the log, lap, seconds into it
-        self._lap_began_s: dict[int, float] = {}  # by its first stored label
+        self._learned: list[tuple[int, int, float]] = []  # of those stored: place in the log, lap, time
         self._reserved: dict[int, tuple[Proposal, Demonstration]] = {}  # the proposal too: so its id stays its own
 
     def aside(self, write: Callable[[Record], None]) -> "Journal":
@@ -61,8 +60,8 @@ class Journal:
             return ()  # it learned before the journal began, and nobody knows which these are
         places = [(self._learned[each.number], each) for each in found]
         return tuple(
-            ContradictionRecord(number, each.source, lap, since_s, each.action, each.others, each.mirrored)
-            for (number, lap, since_s), each in places
+            ContradictionRecord(number, each.source, lap, each.action, each.others, each.mirrored, given_s)
+            for (number, lap, given_s), each in places
         )
 
     def result(
@@ -144,8 +143,7 @@ class Journal:
     def _hand_on(self, label: Demonstration) -> None:
         self._keep(label)
         if label.stored:
-            began_s = self._lap_began_s.setdefault(label.lap, label.stamp_s)
-            self._learned.append((self._given, label.lap, label.stamp_s - began_s))
+            self._learned.append((self._given, label.lap, label.stamp_s))
         self._given += 1
 
     def _decision(self, step: Step, phase: Phase, lap: int, training_steps: int) -> Decision:

@@ -116,16 +116,17 @@ class RunRecord(msgspec.Struct, frozen=True, tag="run"):
 class ContradictionRecord(msgspec.Struct, frozen=True):
     """A label that the novice does not follow, since the `others` say otherwise; `number` is its place in the log.
 
-    `stamp_s` counts from the first label of its lap. `mirrored`: it is followed; left and right exchanged it is not.
+    `given_s` is when, on the robot's clock, as the log has it; None in older records. `mirrored`: it is followed; left
+    and right exchanged it is not.
     """
 
     number: int
     source: str
     lap: int
-    stamp_s: float
     action: Action
     others: Action
     mirrored: bool = False
+    given_s: float | None = None
 
 
 class ResultRecord(msgspec.Struct, frozen=True, tag="result"):

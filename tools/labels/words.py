@@ -8,6 +8,7 @@ from lira.fusion.log.label_file import Demonstration
 from lira.hal.words import plural
 from lira.tools.labels.numbers import ranges
 from lira.tools.output.table import format_table
+from lira.tools.output.when import when
 
 LISTED = ("number", "run", "lap", "time", "source", "speed, turn", "novice's", "")
 EXPLAINED = ("number", "run", "lap", "time", "source", "says speed, turn", "likeness", "adds to speed", "adds to turn")
@@ -66,7 +67,7 @@ def list_table(rows: Sequence[dict[str, Any]]) -> str:
     cells = [
         [
             *(str(row[name]) for name in ("number", "run", "lap")),
-            f"{row['stamp_s']:.1f} s",
+            when(row["stamp_s"]),
             row["source"],
             pair(row["action"]),
             pair(row["novice"]),
@@ -99,7 +100,7 @@ def part_table(rows: Sequence[dict[str, Any]]) -> str:
     cells = [
         [
             *(str(row[name]) for name in ("number", "run", "lap")),
-            f"{row['stamp_s']:.1f} s",
+            when(row["stamp_s"]),
             row["source"],
             pair(row["action"]),
             f"{row['likeness']:.2f}",

@@ -5,6 +5,7 @@ from collections.abc import Callable, Sequence
 
 from lira.fusion.log.run_log import UNPROVEN, ContradictionRecord, EditRecord, LapRecord, ResultRecord
 from lira.hal.words import plural
+from lira.tools.output.when import when
 
 HALVINGS = 60
 
@@ -71,8 +72,9 @@ def contradiction_words(found: Sequence[ContradictionRecord]) -> str:
 def _contradiction(found: ContradictionRecord) -> str:
     """One of them, as it contradicts the others."""
     side = -1.0 if found.mirrored else 1.0
+    given = "" if found.given_s is None else f", {when(found.given_s)}"
     return (
-        f"{found.number} ({found.source}, lap {found.lap}, {found.stamp_s:.1f} s into it: "
+        f"{found.number} ({found.source}, lap {found.lap}{given}: "
         f"turn {side * found.action[1]:+.2f}, the others {side * found.others[1]:+.2f})"
     )
 

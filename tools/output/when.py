@@ -1,5 +1,6 @@
 """A time on a robot's clock, in words: a robot in real time counts from 1970, a twin in lockstep from its start."""
 
+import argparse
 from datetime import UTC, datetime
 
 from lira.hal.clock import COUNTS_FROM_1970_S
@@ -10,3 +11,15 @@ def when(stamp_s: float) -> str:
     if stamp_s < COUNTS_FROM_1970_S:
         return f"{stamp_s:.1f} s"
     return f"{datetime.fromtimestamp(stamp_s, UTC).astimezone():%Y-%m-%d %H:%M:%S}.{int(stamp_s * 10) % 10}"
+
+
+def stamp(text: str) -> float:
+    """Read what `when` says, or seconds alone. For argparse."""
+    try:
+        return float(text.removesuffix("s"))
+    except ValueError:
+        pass
+    try:
+        return datetime.fromisoformat(text).astimezone().timestamp()
+    except ValueError as error:
+        raise argparse.ArgumentTypeError(f"'{text}' is no time like 41.2 or '2026-11-27 10:15:00.2'") from error

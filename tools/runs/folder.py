@@ -67,13 +67,10 @@ def in_the_log(path: Path, found: Sequence[Contradiction]) -> list[Contradiction
     if not found:
         return []
     learned = [(number, label) for number, label in enumerate(read_demonstrations(path)) if label.stored]
-    began_s: dict[int, float] = {}
-    for _, label in learned:
-        began_s.setdefault(label.lap, label.stamp_s)
     places = [(each, *learned[each.number]) for each in found if each.number < len(learned)]
     return [
         ContradictionRecord(
-            number, each.source, label.lap, label.stamp_s - began_s[label.lap], each.action, each.others, each.mirrored
+            number, each.source, label.lap, each.action, each.others, each.mirrored, given_s=label.stamp_s
         )
         for each, number, label in places
     ]

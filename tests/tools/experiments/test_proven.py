@@ -65,10 +65,10 @@ def test_what_went_wrong_on_unseen_layouts_is_said():
 
 
 def test_a_label_whose_mirror_image_alone_contradicts_is_not_said_to_be_left_out():
-    itself = ContradictionRecord(7, "human", 1, 78.6, (0.0, -1.0), (0.4, 0.36))
-    image = ContradictionRecord(3, "human", 1, 5.4, (0.0, 1.0), (0.0, -0.82), mirrored=True)
-    own = "this label contradicts the rest and is not followed: 7 (human, lap 1, 78.6 s into it: turn -1.00, the "
+    itself = ContradictionRecord(7, "human", 1, (0.0, -1.0), (0.4, 0.36), given_s=78.6)
+    image = ContradictionRecord(3, "human", 1, (0.0, 1.0), (0.0, -0.82), mirrored=True)
+    own = "this label contradicts the rest and is not followed: 7 (human, lap 1, 78.6 s: turn -1.00, the "
     assert contradiction_words([itself]) == f"{own}others +0.36)"
-    mirrored = "the mirror image of this label contradicts the rest and is not followed: 3 (human, lap 1, 5.4 s into "
-    assert contradiction_words([image, itself]) == (f"{own}others +0.36); {mirrored}it: turn -1.00, the others +0.82)")
+    mirrored = "the mirror image of this label contradicts the rest and is not followed: 3 (human, lap 1: "
+    assert contradiction_words([image, itself]) == (f"{own}others +0.36); {mirrored}turn -1.00, the others +0.82)")
     assert "the mirror images of these 2 labels contradict the rest and are" in contradiction_words([image, image])

@@ -41,6 +41,7 @@ if TYPE_CHECKING:
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
     from lira.tools.labels.numbers import numbers
+    from lira.tools.output.when import stamp
 
     add = parser.add_argument
     add("what", choices=tuple(DOES), help="what to do")
@@ -50,13 +51,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add("--source", help="list, undo, redo: labels of the human, or of an expert by name")
     add(
         "--from",
-        type=float,
+        type=stamp,
         dest="from_s",
         metavar="S",
         help="list, undo, redo: from this time of the robot's clock on",
     )
-    add("--to", type=float, dest="to_s", metavar="S", help="list, undo, redo: up to this time")
-    add("--time", type=float, metavar="S", help="explain: the label that is nearest to this time")
+    add("--to", type=stamp, dest="to_s", metavar="S", help="list, undo, redo: up to this time")
+    add("--time", type=stamp, metavar="S", help="explain: the label that is nearest to this time")
     add("--run", type=int, metavar="R", help="of this run in the log (default: the last that fits; list: all)")
     add("-o", "--output", type=Path, metavar="FILE", help="merge: the new log")
     add(

@@ -20,10 +20,13 @@ from lira.fusion.preprocess import Features
 from lira.hal.errors import ConfigError
 from lira.hal.profile import load_profile
 from lira.tools.cli import main
+from lira.tools.labels.relearn import relearn
+from lira.tools.output.proven import contradiction_words
+from lira.tools.output.when import when
 from lira.tools.report import write_report
 from lira.tools.report.digest import load_run
 from lira.tools.report.page import outcome
-from lira.tools.runs.folder import snapshot
+from lira.tools.runs.folder import in_the_log, snapshot
 from lira.tools.runs.names import LABELS, NOVICE, RECORD
 
 SIM = load_profile("thesis-sim")
@@ -34,9 +37,9 @@ SEEN = [Features(scan=rng.random(101, np.float32), image=rng.random((32, 32), np
 GIVEN = [("camera", 0, 0.9)] * 4 + [("human", 1, 0.0)] * 2 + [("camera", 0, -0.9)] + [("human", 0, 0.9)] * 3
 
 
-def labels():
+def labels(began_s=0.0):
     for k, (source, scene, turn) in enumerate(GIVEN):
-        yield Demonstration(0.2 * k, k, 1, source, (1.0, turn), (0.0, 0.0), True, SEEN[scene])
+        yield Demonstration(began_s + 0.2 * k, k, 1, source, (1.0, turn), (0.0, 0.0), True, SEEN[scene])
 
 
 @pytest.fixture
@@ -50,7 +53,7 @@ def folder(tmp_path):
             weight = novice.weight(label.source)
             novice.remember(Label(label.features, label.action, label.source, weight))
         said = snapshot(tmp_path, novice, SIM, HEAD)()
-    assert "this label contradicts the rest and is not followed: 6 (camera, lap 1, 1.2 s into it: turn -0.90" in said
+    assert "this label contradicts the rest and is not followed: 6 (camera, lap 1, 1.2 s: turn -0.90" in said
     return tmp_path
 
 
@@ -71,6 +74,25 @@ def test_the_folder_of_a_run_stands_for_its_log(folder, tmp_path, capsys):
     status, said = lira(capsys, "list", empty)
     assert status == 2
     assert f"{empty / LABELS}" in said.err
+
+
+@pytest.mark.parametrize("began_s", [5.0, 1.79e9])
+def test_a_label_has_the_same_time_wherever_it_is_named(folder, capsys, began_s):
+    (folder / LABELS).unlink()
+    with DemonstrationLog(folder / LABELS, SIM, mirrored=True) as log:
+        for label in labels(began_s):
+            log.append(label)
+    time = when(began_s + 1.2)
+    (aside,) = in_the_log(folder / LABELS, relearn(folder / LABELS)[0].set_aside())
+    assert f": 6 (camera, lap 1, {time}: turn -0.90, the others" in contradiction_words([aside])
+    assert time in lira(capsys, "list", folder)[1].out.splitlines()[-4]
+    assert f"label 6 (run 0, lap 1, {time})" in lira(capsys, "explain", folder, "--time", time)[1].out
+
+
+def test_a_time_that_is_none_is_refused(folder, capsys):
+    status, said = lira(capsys, "list", folder, "--from", "noon")
+    assert status == 2
+    assert "'noon' is no time like 41.2 or '2026-11-27 10:15:00.2'" in said.err
 
 
 def test_the_list_says_what_became_of_each_label(folder, capsys):
