@@ -37,7 +37,9 @@ def proof_words(result: ResultRecord) -> str:
     laps = plural(result.laps, "training lap")
     if result.converged:
         return f"proven after {laps}: the novice alone passed {what}"
-    return f"not proven within {laps}: the novice alone did not pass {what}"
+    helped = result.human_labels or result.demonstration or result.interventions
+    unasked = "" if helped else "; while it was taught nobody ever took over, so nobody showed it the way back"
+    return f"not proven within {laps}: the novice alone did not pass {what}{unasked}"
 
 
 def edit_words(edit: EditRecord) -> str:

@@ -1,5 +1,6 @@
 """The words for what was proven, and the interval behind them."""
 
+import msgspec
 import pytest
 from made_up_outcomes import lap
 
@@ -53,6 +54,14 @@ def test_the_proof_is_named_for_what_it_was():
     assert proof_words(result(True, 2, "fresh:11/12")).endswith("passed 11 of 12 fresh layouts")
     assert proof_words(result(False, 12, "own")) == (
         "not proven within 12 training laps: the novice alone did not pass the layout it was taught on"
+    )
+
+
+def test_a_novice_that_nobody_helped_is_said_to_be_one():
+    alone = ResultRecord(False, 12, 0, 0, 0, 26, 41, 41, 600.0, 6.0, proof="fresh:3")
+    assert proof_words(alone).endswith("; while it was taught nobody ever took over, so nobody showed it the way back")
+    assert proof_words(msgspec.structs.replace(alone, interventions=1)).endswith(
+        "did not pass 3 fresh layouts in a row"
     )
 
 

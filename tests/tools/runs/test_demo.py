@@ -57,7 +57,7 @@ def test_a_run_that_is_proven_and_passes_what_it_is_shown_exits_0_with_its_repor
     assert demo.supervise(parts(TWIN), learner(tmp_path), tmp_path) == 0
     out = capsys.readouterr().out
     assert out.startswith("twin 'x' serves world")
-    assert "alone it passed 1 of 1 unseen layouts; 95 %: 3 to 100 %; collisions: 0, lost lines: 0" in out
+    assert "alone it passed 1 of 1 unseen layout; 95 %: 3 to 100 %; collisions: 0, lost lines: 0" in out
     assert "proven after 2 training laps" in out
     assert out.splitlines()[-1] == f"report: {tmp_path / 'report.html'}"
     assert (tmp_path / "report.html").exists()
@@ -151,6 +151,19 @@ def test_missing_experts_are_named_before_anything_starts(tmp_path):
     assert done.returncode == 2
     assert done.stderr.splitlines()[0] == "lira demo: no camera expert comes with the profile 'mine'"
     assert not (tmp_path / "run").exists()
+
+
+@pytest.mark.parametrize("world", ["line", "straight", "eight"])
+def test_a_world_in_which_nobody_would_be_asked_is_refused_at_once(world, monkeypatch, capsys, tmp_path):
+    monkeypatch.setattr(demo, "supervise", lambda *_: 0)
+    words = ["demo", "--world", world, "--run", str(tmp_path / "run")]
+    assert main(words) == 2
+    what, remedy = capsys.readouterr().err.splitlines()
+    assert f"there is no box in '{world}': experts never disagree there, so nobody is asked" in what
+    assert "such as line-obstacles" in remedy
+    assert not (tmp_path / "run").exists()
+    assert main([*words, "--method", "hold", "--layouts", "own", "--proof", "own"]) == 0
+    assert main([*words, "--expert", "camera-expert"]) == 0  # a third may disagree with the others
 
 
 @pytest.mark.parametrize(
