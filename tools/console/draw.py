@@ -130,7 +130,8 @@ def draw_actions(canvas: Canvas, box: pygame.Rect, view: View) -> None:
     panel(canvas, box, "actions: turn and speed, each of the robot's limits; activation beside its threshold")
     decision = view.deciding
     if decision is None:
-        idle = "paused" if view.paused else "nobody decides: start lira fusion" if view.linked else "no link"
+        heard = view.linked or view.waiting
+        idle = "paused" if view.paused else "nobody decides: start lira fusion" if heard else "no link"
         canvas.write(idle, box.center, 28, DIM, centre=True)
         return
     rows: list[tuple[str, Action, ExpertView | None]] = [(e.name, e.action, e) for e in decision.experts]
@@ -211,7 +212,8 @@ def draw_status(canvas: Canvas, box: pygame.Rect, view: View) -> None:
     """Link, speed, battery, emergency stop, keyboard."""
     canvas.rect(PANEL, box, radius=6)
     late = view.link_age_s > STALE_S
-    link = "link lost" if late else f"link {1e3 * view.link_age_s:.0f} ms"
+    lost = "waits in lockstep" if view.waiting else "link lost"
+    link = lost if late else f"link {1e3 * view.link_age_s:.0f} ms"
     low = view.battery is not None and view.battery.voltage_v < LOW_V
     battery = "battery ?" if view.battery is None else f"battery {view.battery.voltage_v:.1f} V"
     battery += "" if view.battery is None else f" ({100 * battery_share(view.battery):.0f} %)"

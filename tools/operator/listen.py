@@ -8,26 +8,28 @@ from typing import TypeVar
 
 from lira.hal.bus.bus import Bus
 from lira.hal.bus.reader import Received
+from lira.hal.bus.services import LOCKSTEP, Info
 from lira.hal.bus.topics import APPLIED, BATTERY, CAMERA, DECISION, ODOM, OPERATOR_ANSWER, SCAN, SESSION, SIM_STATE
 from lira.hal.messages import Applied, Reason
-from lira.hal.profile import RobotProfile
 from lira.tools.operator.view import View
 from lira.tools.operator.voice import explain
 
+REPEATED_S = 3.0  # a robot in lockstep says again what it senses once a second, to whoever may drive it by now
 M = TypeVar("M")
 
 
 class Ears:
-    """Keeps the newest; what comes between two looks is dropped."""
+    """Keeps the newest; what comes between two looks is dropped. `info` is what the robot said of itself."""
 
-    def __init__(self, watch: Bus, profile: RobotProfile) -> None:
+    def __init__(self, watch: Bus, info: Info) -> None:
         self._scan, self._camera = watch.reader(SCAN), watch.reader(CAMERA)
         self._odom, self._applied = watch.reader(ODOM), watch.reader(APPLIED)
         self._decision, self._battery = watch.reader(DECISION), watch.reader(BATTERY)
         self._answer, self._truth = watch.reader(OPERATOR_ANSWER), watch.reader(SIM_STATE)
         self._session = watch.reader(SESSION)
         self._answered, self._verdict_s = 0, -math.inf
-        features = profile.features
+        self._in_lockstep = info.mode == LOCKSTEP
+        features = info.profile.features
         self._view = View(
             watch.robot,
             fov_rad=features.fov_rad,
@@ -62,6 +64,7 @@ class Ears:
             answer_age_s=_age_s(answer, now_s),
             verdict_age_s=now_s - self._verdict_s,
             estop=applied is not None and applied.message.reason is Reason.ESTOP,
+            lockstep=self._in_lockstep and _age_s(odom, now_s) <= REPEATED_S,
         )
 
 

@@ -122,7 +122,7 @@ def situation_of(view: View) -> Situation:
         return _S.ESTOP_CONFIRMED if view.confirmed else _S.ESTOP
     applied = view.applied
     if applied is None or not view.linked:
-        return _S.LOCKSTEP if view.lockstep else _S.NO_LINK
+        return _S.LOCKSTEP if view.waiting else _S.NO_LINK
     if view.other:
         return _S.OTHER
     if applied.source is Source.TELEOP:

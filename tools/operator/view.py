@@ -67,6 +67,11 @@ class View:
         return self.applied is not None and self.link_age_s <= STALE_S
 
     @property
+    def waiting(self) -> bool:
+        """Whether it is there, in lockstep, and nobody drives it."""
+        return self.lockstep and not self.linked
+
+    @property
     def deciding(self) -> Decision | None:
         """The decision that holds now: None if nobody decides any more. Its counts outlive it."""
         return self.decision if self.decision_age_s < STALE_S else None

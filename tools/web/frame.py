@@ -62,6 +62,7 @@ class Frame(msgspec.Struct, frozen=True):
     verdict: str = ""
     accepted: bool | None = None
     link_ms: float | None = None
+    waiting: bool = False
     speed: tuple[float, float] | None = None
     battery_v: float | None = None
     battery_share: float | None = None
@@ -100,6 +101,7 @@ def frame_of(view: View, *, time_s: float, seat: str, language: str) -> Frame:
         verdict=words,
         accepted=accepted,
         link_ms=1e3 * view.link_age_s if view.linked else None,
+        waiting=view.waiting,
         speed=None if view.odom is None or not view.linked else (view.odom.linear_m_s, view.odom.angular_rad_s),
         battery_v=None if battery is None else battery.voltage_v,
         battery_share=None if battery is None else battery_share(battery),

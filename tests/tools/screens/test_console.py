@@ -11,12 +11,15 @@ import numpy as np
 import pytest
 
 from lira.hal.bus.bus import Bus
+from lira.hal.bus.services import ask_info
 from lira.hal.bus.topics import APPLIED, INFO, OPERATOR, OPERATOR_ANSWER
+from lira.hal.client.connect import connect
 from lira.hal.errors import ConfigError
 from lira.hal.messages import (
     STOP,
     Applied,
     BatteryState,
+    Command,
     CompressedImage,
     Decision,
     ExpertView,
@@ -29,8 +32,7 @@ from lira.hal.messages import (
     Source,
     Twist,
 )
-from lira.hal.profile import load_profile
-from lira.tools.bench.parts.robots import null_robot_at_work
+from lira.tools.bench.parts.robots import null_robot_at_work, twin_at_work
 from lira.tools.bench.takeover import policy
 from lira.tools.cli import main
 from lira.tools.console import sound
@@ -43,7 +45,7 @@ from lira.tools.operator.listen import Ears
 from lira.tools.operator.situation import CORNERS, URGENCY, Situation, Urgency
 from lira.tools.operator.tones import TONES
 from lira.tools.operator.view import View
-from lira.tools.operator.voice import Voice, verdict, vocabulary
+from lira.tools.operator.voice import Voice, speak, verdict, vocabulary
 
 os.environ["SDL_VIDEODRIVER"] = os.environ["SDL_AUDIODRIVER"] = "dummy"
 
@@ -279,10 +281,10 @@ def test_the_keys_ask_and_say_that_nobody_answers():
         bus, watch = Bus(name, connect=endpoint), Bus(name, connect=endpoint, watch=True)
         stack.callback(bus.close)
         stack.callback(watch.close)
-        bus.ask(INFO)
+        info = ask_info(bus)
         asked, answers = watch.reader(OPERATOR, depth=16), bus.publisher(OPERATOR_ANSWER)
         client, heard = TeleopClient(bus, watch, 10.0), []
-        ears, keyboard = Ears(watch, load_profile("thesis-sim")), Keyboard(client)
+        ears, keyboard = Ears(watch, info), Keyboard(client)
         listened = bus.publisher(OPERATOR)
 
         def press(keys, condition):
@@ -304,6 +306,40 @@ def test_the_keys_ask_and_say_that_nobody_answers():
         press("", lambda: verdict(view()) == ("paused", True))
         press("p", lambda: heard[1:] == [OperatorRequest(Request.RESUME)])
         press("r", lambda: heard[2:] == [OperatorRequest(Request.RESET)])
+
+
+def looked_at(ears, situation):
+    """Look until that is what is said; return the view."""
+    deadline_s = time.monotonic() + 30.0
+    while speak(view := ears.look()).situation != situation:
+        assert time.monotonic() < deadline_s, view
+        time.sleep(0.1)
+    return view
+
+
+def test_a_robot_in_lockstep_that_nobody_drives_waits_and_is_lost_only_when_it_is_gone():
+    with contextlib.ExitStack() as stack:
+        twin = contextlib.ExitStack()
+        stack.enter_context(twin)
+        name, endpoint, _ = twin.enter_context(twin_at_work("--lockstep", "--world", "line", "--renderer", "sketch"))
+        watch = Bus(name, connect=endpoint, watch=True)
+        stack.callback(watch.close)
+        ears = Ears(watch, ask_info(watch))
+        idle = looked_at(ears, Situation.LOCKSTEP)
+        pictured = picture(idle)
+        time.sleep(1.5)  # it repeats itself once a second: longer than a link may be silent elsewhere
+        assert speak(ears.look()).situation is Situation.LOCKSTEP
+        assert speak(ears.look()).who == "WAITS FOR A DRIVER"
+        assert not np.array_equal(pictured, picture(replace(idle, lockstep=False)))
+        with connect(endpoint, name) as robot:
+            deadline_s = time.monotonic() + 30.0
+            while not ears.look().linked:
+                assert time.monotonic() < deadline_s
+                robot.drive(Command(STOP, robot.now(), answers=robot.read().seq))
+                robot.wait(robot.now() + robot.profile.period_s)
+        looked_at(ears, Situation.LOCKSTEP)
+        twin.close()
+        looked_at(ears, Situation.NO_LINK)
 
 
 def test_the_keyboard_drives_locks_without_the_focus_and_comes_back():

@@ -244,6 +244,17 @@ def test_what_is_old_is_not_shown_as_new():
     assert old["counts"]["human_labels"] == 3  # what was taught stays taught
 
 
+def test_a_robot_that_waits_in_lockstep_is_not_lost():
+    gone = replace(VIEW, link_age_s=3.0)
+    frames = [shown(view) for view in (gone, replace(gone, lockstep=True), replace(VIEW, lockstep=True))]
+    assert [(frame["link_ms"] is None, frame["waiting"]) for frame in frames] == [
+        (True, False),
+        (True, True),
+        (False, False),
+    ]
+    assert frames[1]["who"] == "WAITS FOR A DRIVER"
+
+
 def test_beams_that_say_nothing_are_left_out_and_none_is_far():
     ranges = np.array([math.nan, -math.inf, math.inf, 9.0, 0.5], np.float32)
     frame = shown(replace(VIEW, scan=LaserScan(1.0, -0.2, 0.1, 0.1, 4.0, ranges)))

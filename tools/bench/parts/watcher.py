@@ -17,7 +17,7 @@ LOOK_S = 0.05
 def main(name: str, endpoint: str) -> None:
     """Look for ever."""
     watch = Bus(name, connect=endpoint, watch=True)
-    ears = Ears(watch, ask_info(watch).profile)
+    ears = Ears(watch, ask_info(watch))
     print(READY, flush=True)
     while True:
         ears.look()

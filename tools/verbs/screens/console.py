@@ -49,5 +49,5 @@ def run(args: argparse.Namespace) -> int:
         client = None if args.no_keyboard else robot.client()
         keyboard = None if client is None else Keyboard(client)
         print(f"console shows '{args.name}' at {args.connect}", flush=True)
-        show(Ears(robot.watch, robot.info.profile).look, keyboard, robot.stop)
+        show(Ears(robot.watch, robot.info).look, keyboard, robot.stop)
     return 0

@@ -64,7 +64,7 @@ def run(args: argparse.Namespace) -> int:
     access = Access(open_here=tls is None, hosts=own_names(args.listen))
     with contextlib.ExitStack() as stack:
         robot = stack.enter_context(beside(args.name, args.connect))
-        ears, seat, client = Ears(robot.watch, robot.info.profile), Seat(), robot.client()
+        ears, seat, client = Ears(robot.watch, robot.info), Seat(), robot.client()
         controls = None if client is None else stack.enter_context(contextlib.closing(Controls(client, seat)))
         settings = partial(settings_of, robot.info, args.name, args.layout)
         server = PageServer(ears.look, seat, access, controls, settings)

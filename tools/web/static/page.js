@@ -41,8 +41,8 @@ function show(frame) {
   at("#drive").textContent = { yours: words.leave, free: words.drive, taken: words.taken, viewer: words.viewer }[frame.seat];
   at("#drive").disabled = frame.seat === "taken" || frame.seat === "viewer";
   at("#verdict").textContent = frame.verdict;
-  at("#link").textContent = frame.link_ms === null ? words.no_link : `${words.link} ${frame.link_ms.toFixed(0)} ms`;
-  at("#link").className = frame.link_ms === null ? "bad" : "";
+  at("#link").textContent = frame.link_ms === null ? (frame.waiting ? words.waiting : words.no_link) : `${words.link} ${frame.link_ms.toFixed(0)} ms`;
+  at("#link").className = frame.link_ms === null && !frame.waiting ? "bad" : "";
   at("#speed").textContent = frame.speed === null ? "" : `${frame.speed[0].toFixed(2)} m/s  ${frame.speed[1].toFixed(2)} rad/s`;
   at("#battery").textContent = frame.battery_v === null ? "" : `${words.battery} ${frame.battery_v.toFixed(1)} V (${(100 * frame.battery_share).toFixed(0)} %)`;
   at("#battery").className = frame.battery_share !== null && frame.battery_share < 0.25 ? "bad" : "";
