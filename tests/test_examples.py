@@ -1,5 +1,6 @@
 """Every example runs as it is, in a process of its own, and says what it is meant to say."""
 
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -21,6 +22,17 @@ def test_each_is_named_here_and_short():
     assert {path.name for path in EXAMPLES.glob("*.py")} == set(SAYS)
     for path in EXAMPLES.glob("*.py"):
         assert len(path.read_text().splitlines()) < 40, path.name
+
+
+def test_the_readme_lists_every_file_and_how_to_run_it():
+    rows = re.findall(
+        r"^\| \[(.+?)\]\((.+?)\) \| (.+?) \| (.+?) \|$", (EXAMPLES / "README.md").read_text(), re.MULTILINE
+    )
+    assert [file for file, *_ in rows] == sorted(path.name for path in EXAMPLES.glob("*.*") if path.name != "README.md")
+    for file, link, shows, run in rows:
+        assert link == file
+        assert shows
+        assert f"examples/{file}" in run
 
 
 @pytest.mark.parametrize("name", SAYS)
