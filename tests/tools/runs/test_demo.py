@@ -153,19 +153,6 @@ def test_missing_experts_are_named_before_anything_starts(tmp_path):
     assert not (tmp_path / "run").exists()
 
 
-@pytest.mark.parametrize("world", ["line", "straight", "eight"])
-def test_a_world_in_which_nobody_would_be_asked_is_refused_at_once(world, monkeypatch, capsys, tmp_path):
-    monkeypatch.setattr(demo, "supervise", lambda *_: 0)
-    words = ["demo", "--world", world, "--run", str(tmp_path / "run")]
-    assert main(words) == 2
-    what, remedy = capsys.readouterr().err.splitlines()
-    assert f"there is no box in '{world}': experts never disagree there, so nobody is asked" in what
-    assert "such as line-obstacles" in remedy
-    assert not (tmp_path / "run").exists()
-    assert main([*words, "--method", "hold", "--layouts", "own", "--proof", "own"]) == 0
-    assert main([*words, "--expert", "camera-expert"]) == 0  # a third may disagree with the others
-
-
 @pytest.mark.parametrize(
     ("words", "proof"),
     [([], "fresh:3"), (["--world", "corridor"], "fresh:6"), (["--world", "corridor", "--proof", "own"], "own")],

@@ -4,7 +4,7 @@ The experts drive where they agree, a scripted teacher helps where they do not, 
 learns from all of them, each lap on another layout. It is proven when it drives some fresh layouts in a row alone;
 after that it is shown more of them. It all takes a minute or two and leaves report.html in the run's folder.
 
-A world for it has boxes: without any the experts never disagree.
+A world for it has boxes: without any the experts never disagree, and nobody is asked.
 
 examples:
   lira demo
@@ -34,7 +34,6 @@ from lira.tools.options import add_expert, add_layout, add_protocol, add_randomi
 from lira.tools.output.say import say
 
 if TYPE_CHECKING:
-    from lira.sim_backend.world import World
     from lira.tools.launch.launch import Part
     from lira.tools.launch.processes import ChildProcess
 
@@ -75,7 +74,6 @@ def run(args: argparse.Namespace) -> int:
     from lira.fusion.experts.files import expert_path, experts_of
     from lira.fusion.experts.tasks import TASKS, task_of
     from lira.fusion.methods.presets import method_named
-    from lira.fusion.methods.syllabus import THESIS
     from lira.hal.profile import load_profile
     from lira.sim_backend.catalogue import load_world
     from lira.tools.cli import require
@@ -93,8 +91,6 @@ def run(args: argparse.Namespace) -> int:
         expert_path(expert, profile, task)
     proof = args.proof or f"fresh:{TASKS[task].proofs}"
     preset = method_named(args.method).taught(layouts=args.layouts, proof=proof)
-    if preset.syllabus != THESIS and not args.expert:
-        check_boxes(place)
     require("safetensors", *preset.packages, *(["serial"] if args.wire else []))
     from lira.fusion.experts.load import load_policy  # not sooner: it takes the learner's libraries
 
@@ -120,22 +116,6 @@ def run(args: argparse.Namespace) -> int:
     else:
         parts = direct(name, endpoint, twin, lockstep=True)
     return supervise(parts, lira_command("fusion", *fusion), folder)
-
-
-def check_boxes(world: "World") -> None:
-    """Raise `ConfigError` for a world without boxes: in it only one expert has something to say.
-
-    So it drives all training laps, nobody is asked, and a novice that goes astray by itself is never shown the way
-    back. Nor does such a world have a layout more than one.
-    """
-    if not (world.box or world.along or world.area):
-        what = (
-            f"there is no box in '{world.name}': experts never disagree there, so nobody is asked, and its layouts are"
-        )
-        remedy = (
-            "Choose a world with boxes, such as line-obstacles, or teach as in the thesis: --method hold --layouts own"
-        )
-        raise ConfigError(f"{what} all the same", f"{remedy} --proof own.")
 
 
 def supervise(parts: Sequence["Part"], fusion_command: list[str], folder: Path) -> int:
