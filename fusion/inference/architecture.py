@@ -27,8 +27,9 @@ class Architecture:
     `kind` is the sensor whose expert it is, "fusion" or "kernel". `shapes` are those of the features it looks at, by
     name and in order; `filters` the width of the trunks that see pictures, 0 without any. `examples` is how many a
     kernel drives by, `fallback` whether it knows what its experts do where it knows nothing itself, `halves` whether it
-    asks them again with half of their view free, and `sides` whether it turns to the side of the first of them where it
-    is undecided; `members` the size of the ensemble beside a novice.
+    asks them again with half of their view free, `asks` whether it asks the first of them itself instead of going by
+    what that one taught it, and `sides` whether it turns to its side where it is undecided; `members` the size of the
+    ensemble beside a novice.
     """
 
     kind: str
@@ -38,6 +39,7 @@ class Architecture:
     members: int = 0
     fallback: bool = False
     halves: bool = False
+    asks: bool = False
     sides: bool = False
 
     def __post_init__(self) -> None:
@@ -87,6 +89,8 @@ class Architecture:
                 for trunk, size in zip(self.trunks.values(), self.trunk_sizes, strict=True):
                     sizes |= {f"{trunk}_out.weight": (2, size), f"{trunk}_out.bias": (2,)}
                 sizes["cruise"] = (len(self.shapes), 2)
+            if self.asks:
+                sizes["others"] = (n,)
             return sizes
         widths = (seen, FUSION_HIDDEN, FUSION_HIDDEN, 2) if self.kind == FUSION else (seen, 2)
         for name, (before, after) in zip(self.layers, pairwise(widths), strict=True):

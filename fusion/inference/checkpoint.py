@@ -21,7 +21,7 @@ from lira.hal.profile import MAX_FILTERS
 
 MOST_BYTES = 2**28  # eighty times the largest network that any robot here needs
 MOST_EXAMPLES = 4096
-_OF_KERNELS = ("examples", "fallback", "halves", "sides")
+_OF_KERNELS = ("examples", "fallback", "halves", "asks", "sides")
 _KEY = "lira"  # the one metadata entry, JSON
 _Share = Annotated[float, Meta(ge=-1.01, le=1.01)]  # of a robot's top speed
 
@@ -34,8 +34,8 @@ class Checkpoint:
     the trunks that see pictures, 0 without any. `cruise` is an expert's measured action (linear, angular) on an empty
     straight course; `provenance` the command that made it. `labels` and `training_steps` are what it took; None for a
     file that was written before they were counted. `examples` is how many a kernel drives by, and `fallback` whether
-    it falls back on its experts, `halves` whether it asks them with half of their view free, `sides` whether it takes
-    the side of the first; the file of a network does not speak of these.
+    it falls back on its experts, `halves` whether it asks them with half of their view free, `asks` whether it asks the
+    first for what that one taught it, `sides` whether it takes its side; the file of a network does not speak of these.
     """
 
     kind: str
@@ -50,6 +50,7 @@ class Checkpoint:
     examples: Annotated[int, Meta(ge=0, le=MOST_EXAMPLES)] = 0
     fallback: bool = False
     halves: bool = False
+    asks: bool = False
     sides: bool = False
 
     @classmethod

@@ -1,12 +1,15 @@
 """The novice of `policies/kernel.py` as it drives alone: the regression when nobody teaches it any more.
 
-Where it knows nothing it falls back on its experts, as far as only the first of them has anything to say: with a_1 what
-that one does if all others are quiet, else zero, it does
+Where all experts but the first are quiet, it asks that one, as far as nobody else has shown it what to do. With a_1
+what that expert does, and P' as P, of the labels alone that it did not give itself, since those say no more than it
+does, it does
 
-    g m(x) + (1 - k(x)^T P k(x)) a_1
+    (1 - w(x)) g m(x) + w(x) a_1,    w(x) = 1 - k(x)^T P' k(x)
 
-so that it does not lose a line only because nobody has shown it this one. Where two experts have something to say and
-nobody has shown it whom to follow, it stands as ever.
+so that it does not lose a line only because nobody has shown it this one. Where another has something to say and nobody
+has shown it whom to follow, it is as slow as it knows little, but turns as far as what it knows says, or creeping on it
+would still run into what it turns away from: where it knows less than half, 1 - u(x) = k(x)^T P k(x) < 1/2, its turn is
+larger by (2 (1 - u(x)))^-1/2.
 
 Labels that say full steer to either side, before a box straight ahead or where the line is just out of view, have a
 mean that says neither. How large a turn they say, whichever side, is
@@ -38,6 +41,8 @@ from lira.fusion.preprocess import MODALITIES, Features
 from lira.hal.messages import Action, FloatArray
 
 QUIET = 0.2  # an expert less than this away from its cruise action has nothing to say, as with `hold` of LIRA-SPF
+LITTLE = 0.5  # it knows less than half: its turn is made up for
+NOTHING = 1e-3  # it knows no more than this: there is no turn to make up for
 UNDECIDED = 0.2  # so much larger a turn to either side than their mean: labels are not of one mind
 NEVER = 1e9  # a limit that no deviation comes to; a file holds finite numbers
 _LEAST_LENGTH = np.float32(1e-12)  # a trunk that sees nothing stays zero instead of becoming nan
@@ -59,6 +64,11 @@ class Advice(NamedTuple):
         own = -1.0 if turn < 0.0 else 1.0
         return own if self.hesitation else self.side * sides
 
+    @property
+    def given(self) -> bool:
+        """Whether it says anything."""
+        return not (self.hesitation or self is SILENCE)
+
 
 SILENCE = Advice(np.zeros(2, np.float32), 0.0, hesitation=False)
 HESITATION = SILENCE._replace(hesitation=True)
@@ -70,14 +80,14 @@ class KernelNet(DrivingNet):
     Its weights are the trunks' and, for n examples, `x` [n, size], `y` [n, 2] and `noise` [n], a length scale for each
     trunk, the deviations s [2] and the gain g [1], all as in `policies/kernel.py`; and the `limit` [1], the largest
     deviation of a turn in the runs that proved it. One that falls back also has its experts' last layers and their
-    `cruise` actions [experts, 2].
+    `cruise` actions [experts, 2]; `others` [n] is 1 for an example that the first of them did not give, else 0.
     """
 
     @classmethod
     def from_experts(cls, experts: Sequence[Weighted], cruises: Sequence[Action] | None = None) -> "KernelNet":
         """Build one that sees as the experts do and knows nothing; with their `cruises` it falls back on them."""
-        falls_back = cruises is not None
-        architecture = replace(Architecture.novice(KERNEL, experts), fallback=falls_back, halves=falls_back)
+        asks = cruises is not None
+        architecture = replace(Architecture.novice(KERNEL, experts), fallback=asks, halves=asks, asks=asks)
         theirs = trunk_weights(experts)
         if cruises is not None:
             theirs |= head_weights(experts) | {"cruise": np.array(cruises, np.float32)}
@@ -97,10 +107,14 @@ class KernelNet(DrivingNet):
         features = self.features(seen)
         k, advice = self._k(features), self._advice(seen, features)
         action = (k @ self._a).astype(np.float32) * self._gains
+        if advice.given:
+            w = np.float32(unknown(k, self._of_others))
+            action = (np.float32(1.0) - w if self.architecture.asks else 1.0) * action + w * advice.action
         if advice is not SILENCE:
-            action += np.float32(unknown(k, self._p)) * advice.action
             side = advice.side_for(action[ANGULAR], sides=self.architecture.sides)
             action[ANGULAR] = decided(action[ANGULAR], self._gains[ANGULAR], k @ self._squares, side)
+        if self.architecture.asks and not advice.given:
+            action[ANGULAR] *= made_up_for(unknown(k, self._p))
         linear, angular = np.clip(action, np.float32(-1.0), np.float32(1.0)).tolist()
         return linear, angular
 
@@ -129,6 +143,7 @@ class KernelNet(DrivingNet):
         self._p = np.linalg.inv(covariance)
         self._a: Doubles = self._p @ weights["y"]
         self._squares: Doubles = self._p @ weights["y"][:, ANGULAR] ** 2
+        self._of_others = without(self._p, weights["others"] < 1.0) if self.architecture.asks else self._p
         self._gains = np.array([1.0, weights["gain"][0]], np.float32)
         self._scale, self._limit = weights["scale"], float(weights["limit"][0])
         self._heads: list[Dense] = []
@@ -175,6 +190,19 @@ def decided(turn: NDArray[Any], gain: float, squares: NDArray[Any], side: NDArra
     size = gain * np.sqrt(np.maximum(squares, 0.0))
     undecided = (size > np.abs(turn) + UNDECIDED) & np.not_equal(side, 0.0)
     return np.where(undecided, side * size, turn)
+
+
+def made_up_for(unknown: NDArray[Any]) -> NDArray[Any]:
+    """How much larger the turn is where nobody is asked and so much [...] is unknown."""
+    factor: NDArray[Any] = np.sqrt(LITTLE / np.clip(1.0 - unknown, NOTHING, LITTLE))
+    return factor
+
+
+def without(p: NDArray[Any], gone: NDArray[np.bool_]) -> Doubles:
+    """P [n, n] of the examples that are not `gone` [n]; the rows of those are zero."""
+    rows = p[:, gone]
+    left: Doubles = p - rows @ np.linalg.solve(p[np.ix_(gone, gone)], rows.T)
+    return left
 
 
 def unknown(k: Doubles, p: NDArray[Any]) -> Doubles:

@@ -30,6 +30,7 @@ class KernelNovice(Novice):
         self._network = network
         sees = network.architecture
         self._settings = settings
+        self._first = next(iter(sees.trunks.values()))  # the name of its first expert
         self._mirrored = mirrored
         self._given: list[tuple[str, Action]] = []  # who gave each label, and what it says
         self._group = 0
@@ -80,12 +81,12 @@ class KernelNovice(Novice):
         """Learn a label. What one source shows in a row is a group: its labels say little about each other's worth."""
         if not self._given or self._given[-1][0] != label.source:
             self._group += 1
-        human = label.source == Driver.HUMAN
+        human, own = label.source == Driver.HUMAN, label.source == self._first
         if human and abs(label.action[ANGULAR]) >= QUIET and (side := self._network.advice(label.features).side):
             self._agreed.append(label.action[ANGULAR] * side > 0.0)
         for each in (label, mirror(label)) if self._mirrored else (label,):
             x = self._x(each.features)
-            self.ridge.add(x, each.action, each.weight, human=human, group=self._group, label=self.stored)
+            self.ridge.add(x, each.action, each.weight, human=human, own=own, group=self._group, label=self.stored)
         self._given.append((label.source, label.action))
         self.stored += 1
         self.training_steps += 1
@@ -125,6 +126,8 @@ class KernelNovice(Novice):
             "gain": np.array([self.ridge.gain], np.float32),
             "limit": np.array([min((1.0 + ROUNDING) * self.limit, NEVER)], np.float32),
         }
+        if self._network.architecture.asks:
+            weights["others"] = (~self.ridge.own[used]).astype(np.float32)
         return KernelNet(replace(self._network.architecture, examples=int(used.sum()), sides=self.takes_sides), weights)
 
     @property
@@ -135,7 +138,8 @@ class KernelNovice(Novice):
     def _alone(self, seen: Sequence[Features], *, proving: bool) -> list[Action]:
         # In pairs: a trunk remembers what it saw last.
         looks = [(self._x(each), self._network.advice(each)) for each in seen]
-        x, advice = np.array([each for each, _ in looks]), [each for _, each in looks]
+        x = np.array([each for each, _ in looks])
+        advice = [each for _, each in looks] if self._network.architecture.fallback else None
         likeness = self.ridge.k(x if len(seen) > 1 else x[0]).reshape(len(seen), -1)
         if proving:
             self._meet(likeness)

@@ -41,7 +41,17 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from lira.fusion.inference.kernel_net import ANGULAR, Advice, Doubles, decided, kernel, parts, unknown
+from lira.fusion.inference.kernel_net import (
+    ANGULAR,
+    Advice,
+    Doubles,
+    decided,
+    kernel,
+    made_up_for,
+    parts,
+    unknown,
+    without,
+)
 from lira.fusion.policies.growing import Rows, Square
 from lira.hal.config import Table
 from lira.hal.messages import FloatArray
@@ -81,6 +91,7 @@ class Fit:
     noise: Doubles  # the diagonal of N [n]
     used: Flags  # [n]
     human: Flags  # [n]
+    own: Flags  # whether it is the first expert's own [n]
     groups: Numbers  # [n]
 
     def mean(self, k: Doubles) -> Doubles:
@@ -98,6 +109,11 @@ class Fit:
         """P (y * y) [n], y being the turns: k(x)^T times it is s(x)^2."""
         product: Doubles = self.p @ self.y[:, ANGULAR] ** 2
         return product
+
+    @cached_property
+    def of_others(self) -> Doubles:
+        """P' [n, n]: of the labels alone that the first expert did not give itself."""
+        return without(self.p, self.used & self.own)
 
     @cached_property
     def left_out(self) -> tuple[Doubles, Doubles]:
@@ -153,6 +169,7 @@ class KernelRidge:
         self._y = Rows((2,), np.float64)
         self._w = Rows((), np.float64)
         self._human = Rows((), np.bool_)
+        self._own = Rows((), np.bool_)
         self._groups = Rows((), np.int64)
         self._labels = Rows((), np.int64)
         self._p = Square()
@@ -183,6 +200,11 @@ class KernelRidge:
         return self._human.rows
 
     @property
+    def own(self) -> Flags:
+        """Whether it is the first expert's own [n]."""
+        return self._own.rows
+
+    @property
     def groups(self) -> Numbers:
         """Which group each belongs to [n]."""
         return self._groups.rows
@@ -204,7 +226,15 @@ class KernelRidge:
         return self._asked[1]
 
     def add(
-        self, x: FloatArray, action: tuple[float, float], weight: float, *, human: bool, group: int, label: int
+        self,
+        x: FloatArray,
+        action: tuple[float, float],
+        weight: float,
+        *,
+        human: bool,
+        group: int,
+        label: int,
+        own: bool = False,
     ) -> None:
         """Append one example x [size] of a label: P is bordered (Schur complement). Of too many, one has to go."""
         k = self.k(x)
@@ -217,6 +247,7 @@ class KernelRidge:
         self._y.append(action)
         self._w.append(weight)
         self._human.append(human)
+        self._own.append(own)
         self._groups.append(group)
         self._labels.append(label)
         self._fit = self._asked = None
@@ -236,7 +267,7 @@ class KernelRidge:
                 leave_out(p, worst)
                 used[worst] = False
                 a = p @ y
-            self._fit = Fit(p, y, a, self._settings.noise / self.w, used, self.human, self.groups)
+            self._fit = Fit(p, y, a, self._settings.noise / self.w, used, self.human, self.own, self.groups)
         return self._fit
 
     @property
@@ -265,12 +296,15 @@ class KernelRidge:
         """
         actions = self.fit.mean(k) * (1.0, gain)
         if advice is not None:
-            actions += unknown(k, self.fit.p)[:, None] * np.array([each.action for each in advice])
+            given = np.array([each.given for each in advice])
+            w = np.where(given, unknown(k, self.fit.of_others), 0.0)[:, None]
+            actions = (1.0 - w) * actions + w * np.array([each.action for each in advice])
             turns = actions[:, ANGULAR]
             side = np.array(
                 [each.side_for(turn, sides=sides) for each, turn in zip(advice, turns.tolist(), strict=True)]
             )
-            actions[:, ANGULAR] = decided(turns, gain, k @ self.fit.squares, side)
+            turns = decided(turns, gain, k @ self.fit.squares, side)
+            actions[:, ANGULAR] = turns * np.where(given, 1.0, made_up_for(unknown(k, self.fit.p)))
         return [(clipped(linear), clipped(angular)) for linear, angular in actions.tolist()]
 
     @property
@@ -297,7 +331,7 @@ class KernelRidge:
             residual[self.human] = np.inf
         gone = int(residual.argmin())
         leave_out(p, gone)
-        for kept in (self._p, self._x, self._y, self._w, self._human, self._groups, self._labels):
+        for kept in (self._p, self._x, self._y, self._w, self._human, self._own, self._groups, self._labels):
             kept.remove(gone)
 
 

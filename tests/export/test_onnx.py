@@ -1,13 +1,13 @@
 """A network as ONNX, run by somebody else's runtime: the same actions, for one observation and for many."""
 
 import json
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import onnx
 import onnxruntime
 import pytest
+from nets import before
 
 from lira.fusion.inference.checkpoint import Checkpoint, load_checkpoint, save_checkpoint
 from lira.fusion.inference.kernel_net import KernelNet
@@ -108,7 +108,7 @@ def test_one_that_takes_its_first_experts_side_does_the_same():
     novice = KernelNovice(sees, LearningSettings(), KernelSettings(contradicts=None), mirrored=True)
     undecided, seen = nothing_near(seeing(SHAPES, 15)), [nothing_near(seeing(SHAPES, k)) for k in range(3, 30, 4)]
     for turn in (1.0, -1.0):
-        novice.remember(Label(undecided, (1.0, turn), "camera", 3.0))
+        novice.remember(Label(undecided, (1.0, turn), "lidar", 3.0))
     for each in seen[:3]:  # where the human agrees with that expert
         novice.remember(Label(each, (1.0, sees.advice(each).side), "human", 0.01))
     network = novice.frozen()
@@ -132,9 +132,9 @@ def test_one_that_goes_by_itself_where_an_expert_hesitates_does_the_same():
     actions = [network.act(each) for each in boxes]
     assert max(abs(turn) for _, turn in actions) > 0.7
     np.testing.assert_allclose(ask(build(network, about(network)), boxes)["action"], actions, atol=CLOSE)
-    before = KernelNet(replace(network.architecture, halves=False), network.weights())
-    actions = [before.act(each) for each in boxes]
-    np.testing.assert_allclose(ask(build(before, about(before)), boxes)["action"], actions, atol=CLOSE)
+    for older in (before(network), before(network, halves=True)):
+        actions = [older.act(each) for each in boxes]
+        np.testing.assert_allclose(ask(build(older, about(older)), boxes)["action"], actions, atol=CLOSE)
 
 
 def test_a_file_says_what_it_is_and_the_verb_writes_it(tmp_path, capsys):

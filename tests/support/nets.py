@@ -1,5 +1,7 @@
 """Networks of the sizes that the robots' profiles have, in few words, and something for them to see."""
 
+from dataclasses import replace
+
 import numpy as np
 
 from lira.fusion.inference.kernel_net import KernelNet
@@ -26,6 +28,12 @@ def fusion_net(bins, filters, *, px=32, seed=0):
 def kernel_net(bins, filters, *, px=32, seed=0, cruises=None):
     """A novice of plus that was taught nothing."""
     return KernelNet.from_experts([camera_net(filters, px=px, seed=seed), lidar_net(bins, seed=seed)], cruises)
+
+
+def before(network, *, halves=False):
+    """A novice of plus as its file says that was written, and proven, before it asked its first expert, or halves."""
+    weights = {name: array for name, array in network.weights().items() if name != "others"}
+    return KernelNet(replace(network.architecture, asks=False, halves=halves), weights)
 
 
 def noise(bins, seed=0):

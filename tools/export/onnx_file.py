@@ -18,7 +18,7 @@ from onnx import TensorProto, helper, numpy_helper
 
 from lira.fusion.inference.architecture import KERNEL, Architecture, Weights
 from lira.fusion.inference.checkpoint import Checkpoint
-from lira.fusion.inference.kernel_net import ANGULAR, QUIET, UNDECIDED, kernel, parts
+from lira.fusion.inference.kernel_net import ANGULAR, LITTLE, NOTHING, QUIET, UNDECIDED, kernel, parts, without
 from lira.fusion.inference.layers import SLOPE
 from lira.fusion.inference.networks import DrivingNet
 from lira.fusion.preprocess import MODALITIES
@@ -154,15 +154,19 @@ def _kernel(graph: Graph, what: Architecture, weights: Weights, seen: Sequence[s
     mean = graph.add("MatMul", [values, graph.constant("a", p @ weights["y"])])
     gains = graph.constant("gains", np.array([1.0, weights["gain"][0]], np.float32))
     turned = graph.add("Mul", [graph.cast(mean), gains])
-    known = graph.add("Mul", [graph.add("MatMul", [values, graph.constant("p", p)]), values])
-    axis = graph.constant("examples", np.array([1]))
-    rest = graph.add("Sub", [one, graph.add("ReduceSum", [known, axis], keepdims=1)])
-    unknown = graph.add("Max", [rest, graph.constant("nothing", np.float64(0.0))])
+    unknown = _unknown(graph, values, "p", p)
     if what.fallback:
-        first, side, hesitation = _advice(graph, what, weights, seen)
-        turned = graph.add("Add", [turned, graph.add("Mul", [graph.cast(unknown), first])])
+        first, side, hesitation, asked = _advice(graph, what, weights, seen)
+        w = unknown
+        if what.asks:
+            w = _unknown(graph, values, "p_of_others", without(p, weights["others"] < 1.0))
+            rest = graph.add("Sub", [one, graph.add("Where", [asked, w, graph.constant("zero", np.float64(0.0))])])
+            turned = graph.add("Mul", [turned, graph.cast(rest)])
+        turned = graph.add("Add", [turned, graph.add("Mul", [graph.cast(w), first])])
         squares = graph.add("MatMul", [values, graph.constant("squares", p @ weights["y"][:, ANGULAR:] ** 2)])
         turned = _decided(graph, turned, weights["gain"], squares, _side_for(graph, turned, side, hesitation))
+        if what.asks:
+            turned = _made_up_for(graph, turned, unknown, asked)
     limits = [graph.constant("low", np.float32(-1.0)), graph.constant("high", np.float32(1.0))]
     graph.add("Clip", [turned, *limits], "action")
     spread = graph.add("Sqrt", [unknown])
@@ -170,8 +174,28 @@ def _kernel(graph: Graph, what: Architecture, weights: Weights, seen: Sequence[s
     graph.add("Mul", [graph.cast(spread), scale], "deviation")
 
 
-def _advice(graph: Graph, what: Architecture, weights: Weights, seen: Sequence[str]) -> tuple[str, str, str]:
-    """What `Advice` says: the first expert's action and side where all others are quiet, and whether one hesitates."""
+def _unknown(graph: Graph, values: str, name: str, p: ArrayLike) -> str:
+    """What `unknown` says of kernel values [n, examples] and this P, [n, 1]."""
+    known = graph.add("Mul", [graph.add("MatMul", [values, graph.constant(name, p)]), values])
+    axis, one = graph.constant("examples", np.array([1])), graph.constant("one", np.float64(1.0))
+    rest = graph.add("Sub", [one, graph.add("ReduceSum", [known, axis], keepdims=1)])
+    return graph.add("Max", [rest, graph.constant("zero", np.float64(0.0))])
+
+
+def _made_up_for(graph: Graph, action: str, unknown: str, asked: str) -> str:
+    """The action with its turn as `made_up_for` has it where nobody is asked."""
+    one, little = graph.constant("one", np.float64(1.0)), graph.constant("little", np.float64(LITTLE))
+    known = graph.add("Max", [graph.add("Sub", [one, unknown]), graph.constant("nothing", np.float64(NOTHING))])
+    factor = graph.add("Sqrt", [graph.add("Div", [little, graph.add("Min", [known, little])])])
+    linear, turn = (graph.column(action, k) for k in (0, ANGULAR))
+    larger = graph.add("Mul", [turn, graph.cast(graph.add("Where", [asked, one, factor]))])
+    return graph.add("Concat", [linear, larger], axis=1)
+
+
+def _advice(graph: Graph, what: Architecture, weights: Weights, seen: Sequence[str]) -> tuple[str, str, str, str]:
+    """What `Advice` says: the first expert's action and side where it is asked, whether another hesitates, and whether
+    it is asked.
+    """
     quiet, none = graph.constant("quiet", np.float32(QUIET)), graph.constant("none", np.float32(0.0))
     whole = [_away(graph, what, weights, name, x) for name, x in zip(what.shapes, seen, strict=True)]
     halves = [
@@ -187,7 +211,7 @@ def _advice(graph: Graph, what: Architecture, weights: Weights, seen: Sequence[s
     turn = graph.column(away, ANGULAR)
     speaks = graph.add("And", [asked, graph.add("GreaterOrEqual", [graph.add("Abs", [turn]), quiet])])
     side = graph.add("Where", [speaks, graph.add("Sign", [turn]), none]) if what.sides else none
-    return graph.add("Where", [asked, action, none]), side, hesitation
+    return graph.add("Where", [asked, action, none]), side, hesitation, asked
 
 
 def _away(graph: Graph, what: Architecture, weights: Weights, feature: str, x: str) -> tuple[str, str]:

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from nets import camera_net, fusion_net, kernel_net, lidar_net, noise, shapes
+from nets import before, camera_net, fusion_net, kernel_net, lidar_net, noise, shapes
 from safetensors.numpy import save_file
 
 from lira.fusion.experts.files import shipped_path
@@ -17,7 +17,7 @@ from lira.hal.profile import load_profile
 
 SEEN = noise(101)
 FALLS_BACK = kernel_net(101, 16, cruises=[(1.0, 0.0), (0.9, 0.1)])
-AS_BEFORE = KernelNet(replace(FALLS_BACK.architecture, halves=False), FALLS_BACK.weights())
+AS_BEFORE = before(FALLS_BACK)
 TAKES_SIDES = KernelNet(replace(FALLS_BACK.architecture, sides=True), FALLS_BACK.weights())
 SHAPES = shapes(101)
 
@@ -37,8 +37,8 @@ def checkpoint(kind="fusion", **changes) -> Checkpoint:
         (lidar_net(101, seed=2), checkpoint("lidar", provenance='lira train-expert lidar "ä"')),
         (fusion_net(101, 16, seed=3), checkpoint()),
         (kernel_net(101, 16), checkpoint("kernel")),
-        (FALLS_BACK, checkpoint("kernel", fallback=True, halves=True)),
-        (TAKES_SIDES, checkpoint("kernel", fallback=True, halves=True, sides=True)),
+        (FALLS_BACK, checkpoint("kernel", fallback=True, halves=True, asks=True)),
+        (TAKES_SIDES, checkpoint("kernel", fallback=True, halves=True, asks=True, sides=True)),
         (AS_BEFORE, checkpoint("kernel", fallback=True)),
     ],
 )

@@ -5,10 +5,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from nets import camera_net, lidar_net
+from nets import before, camera_net, lidar_net
 
 from lira.fusion.inference.checkpoint import Checkpoint, load_checkpoint, save_checkpoint
-from lira.fusion.inference.kernel_net import SILENCE, KernelNet
+from lira.fusion.inference.kernel_net import SILENCE, KernelNet, unknown
 from lira.fusion.learning import kernel_novice
 from lira.fusion.learning.kernel_novice import KernelNovice
 from lira.fusion.learning.labels import Label, mirror
@@ -150,6 +150,36 @@ def test_alone_it_does_what_the_first_expert_does_as_far_as_it_knows_nothing_and
     assert learner.alone(seen(77)) == pytest.approx(learner.ridge.act(learner.ridge.x[0], learner.ridge.gain), abs=0.02)
 
 
+def test_what_the_first_expert_taught_it_is_asked_of_that_expert_itself():
+    learner = novice(cruises=cruises(lidar_quiet=True), mirrored=False)
+    first = CAMERA.driving().act(seen(77))
+    for _ in range(20):  # as where labels of states that look alike say something else
+        learner.remember(Label(seen(77), (0.9, -0.9), "camera"))
+    assert learner.act(seen(77)) == pytest.approx((0.9, -0.9), abs=0.02)  # it is taught as ever
+    assert learner.alone(seen(77)) == pytest.approx(first)
+    assert learner.frozen().act(seen(77)) == pytest.approx(first, abs=1e-4)
+    assert before(learner.frozen(), halves=True).act(seen(77)) == pytest.approx((0.9, -0.9), abs=0.03)
+    for source in ("lidar", "mean", "human"):  # somebody else says no
+        taught = novice(cruises=cruises(lidar_quiet=True), mirrored=False)
+        for _ in range(20):
+            taught.remember(Label(seen(77), (0.9, -0.9), source))
+        assert taught.alone(seen(77))[0] == pytest.approx(0.9, abs=0.02)
+        assert taught.frozen().act(seen(77)) == pytest.approx(taught.alone(seen(77)), abs=1e-4)
+
+
+def test_where_nobody_is_asked_and_little_is_known_it_drives_slowly_and_turns_as_far_as_what_it_knows_says():
+    settings = KernelSettings(length=0.7, lengths=(), gain=1.0)
+    learner = novice(cruises=cruises(lidar_quiet=False), mirrored=False, settings=settings)
+    learner.remember(Label(seen(0), (1.0, -0.6), "human", 1.0))
+    linear, angular = learner.act(seen(1))
+    known = 1.0 - unknown(learner.ridge.k(learner._x(seen(1))), learner.ridge.fit.p)
+    assert 0.0 < known < 0.5
+    assert learner.alone(seen(1)) == pytest.approx((linear, max(-1.0, angular * (0.5 / known) ** 0.5)))
+    assert learner.frozen().act(seen(1)) == pytest.approx(learner.alone(seen(1)), abs=1e-4)
+    assert before(learner.frozen(), halves=True).act(seen(1)) == pytest.approx((linear, angular), abs=1e-4)
+    assert learner.alone(seen(0)) == pytest.approx(learner.act(seen(0)))  # it knows this
+
+
 def test_where_another_expert_has_something_to_say_it_stands():
     assert novice(cruises=cruises(lidar_quiet=False)).alone(seen(77)) == (0.0, 0.0)
     assert novice().alone(seen(77)) == (0.0, 0.0)
@@ -168,7 +198,7 @@ def test_where_labels_say_full_steer_to_either_side_it_turns_to_the_one_that_its
     )
     for _ in range(20):
         for turn in (1.0, -1.0):
-            learner.remember(Label(here, (1.0, turn), "camera", 3.0))
+            learner.remember(Label(here, (1.0, turn), "lidar", 3.0))
     assert learner.alone(here)[1] == pytest.approx(0.0, abs=0.1)  # nobody has said that this expert is right
     learner.remember(Label(here, (1.0, side or 1.0), "human", 0.01))
     assert learner.alone(here)[1] == pytest.approx(side, abs=0.1)
@@ -211,9 +241,7 @@ def test_where_another_expert_hesitates_and_labels_are_undecided_it_turns_to_its
     assert learner.alone(box(0))[1] * own > 0.8
     frozen = learner.frozen()
     assert frozen.act(box(0)) == pytest.approx(learner.alone(box(0)), abs=1e-4)
-    # As a file says that was written, and proven, before.
-    before = KernelNet(replace(frozen.architecture, halves=False), frozen.weights())
-    assert abs(before.act(box(0))[1]) < 0.3
+    assert abs(before(frozen).act(box(0))[1]) < 0.3
 
 
 def test_an_expert_to_whose_side_the_human_does_not_turn_is_not_asked_for_it():
