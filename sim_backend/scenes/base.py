@@ -36,6 +36,8 @@ class View:
     height_px: int
     tangents: tuple[float, float] = field(init=False)  # of half the angles of view, wide and high
     bounds: Floats = field(init=False, repr=False, compare=False)  # the view's six sides, outward, [3, 6]
+    slopes: Floats = field(init=False, repr=False, compare=False)  # of its right and lower edge, [2, 1, 1]
+    middle_px: Floats = field(init=False, repr=False, compare=False)  # of the picture, x and y, [2, 1, 1]
 
     def __post_init__(self) -> None:
         """Work out once what every picture needs. The pixels need not be square."""
@@ -43,6 +45,8 @@ class View:
         sides = np.array([(1, 0, -wide), (-1, 0, -wide), (0, 1, -high), (0, -1, -high), (0, 0, -1), (0, 0, 1)])
         object.__setattr__(self, "tangents", (wide, high))
         object.__setattr__(self, "bounds", (sides / np.sqrt((sides**2).sum(1, keepdims=True))).T)
+        object.__setattr__(self, "slopes", np.array([wide, -high])[:, None, None])
+        object.__setattr__(self, "middle_px", np.array([self.width_px / 2, self.height_px / 2])[:, None, None])
 
     def eye(self, pose: Pose) -> Floats:
         """Where the camera is on a robot at this pose, [3]."""

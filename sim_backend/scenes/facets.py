@@ -5,10 +5,11 @@ from numpy.typing import NDArray
 
 from lira.sim_backend.layout import Layout
 from lira.sim_backend.polyline import Floats
-from lira.sim_backend.scenes.base import FAR_M, NEAR_M, Pose, View
+from lira.sim_backend.scenes.base import FAR_M, NEAR_M, View
 from lira.sim_backend.scenes.shapes import Indices, box_mesh, paint, straighten
 
 Flags = NDArray[np.bool_]
+REACH_M = np.array([0.0, 0.0, 0.0, 0.0, -NEAR_M, FAR_M])  # of a view's six sides from the eye
 
 
 class Facets:
@@ -35,29 +36,28 @@ class Facets:
         """Which of them an eye at [3] sees from outside, [n]."""
         return self._outward @ eye > self._offset
 
-    def in_view(self, view: View, pose: Pose, eye: Floats) -> Flags:
+    def in_view(self, view: View, eye: Floats, axes: Floats) -> Flags:
         """Which of them may have a part in a view, [n]: never too few, at times a few too many."""
-        bounds = (view.axes(pose) @ view.bounds).T
-        reach_m = bounds @ eye + (0.0, 0.0, 0.0, 0.0, -NEAR_M, FAR_M)
+        bounds = (axes @ view.bounds).T
+        reach_m = bounds @ eye + REACH_M
         inside: Flags = np.logical_and.reduce(bounds @ self._centre <= self._radius_m + reach_m[:, None], axis=0)
         return inside
 
 
-def project(corners: Floats, view: View, pose: Pose, eye: Floats) -> Floats:
+def project(corners: Floats, view: View, eye: Floats, axes: Floats) -> Floats:
     """Where in the picture the corners of faces [n, 4, 3] are: x and y [2, m, 4], in pixels from its upper left corner.
 
-    Of faces that come too near the eye the part that does is cut off, which leaves none, one or two of them.
+    `axes` are the camera's own as columns. Of faces that come too near the eye the part that does is cut off, which
+    leaves none, one or two of them.
     """
-    own = ((corners.reshape(-1, 3) - eye) @ view.axes(pose)).reshape(corners.shape)
-    if own[..., 2].min() < NEAR_M:
-        near = (own[..., 2] < NEAR_M).any(axis=1)
-        pieces = [piece for face in own[near].tolist() for piece in cut(face)]
-        own = np.concatenate([own[~near], np.array(pieces).reshape(-1, 4, 3)])
-    right, up, ahead = own.transpose(2, 0, 1)
-    wide, high = view.tangents
-    places = np.empty((2, *ahead.shape))
-    places[0] = view.width_px / 2 * (1.0 + right / (wide * ahead))
-    places[1] = view.height_px / 2 * (1.0 - up / (high * ahead))
+    own = (axes.T @ (corners.reshape(-1, 3) - eye).T).reshape(3, -1, 4)
+    if own[2].min() < NEAR_M:
+        near = (own[2] < NEAR_M).any(axis=1)
+        pieces = [piece for face in own[:, near].transpose(1, 2, 0).tolist() for piece in cut(face)]
+        own = np.concatenate([own[:, ~near], np.array(pieces).reshape(-1, 4, 3).transpose(2, 0, 1)], axis=1)
+    places: Floats = own[:2] / (view.slopes * own[2])
+    places += 1.0
+    places *= view.middle_px
     return places
 
 

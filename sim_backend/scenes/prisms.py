@@ -73,7 +73,9 @@ class Prisms:
         chosen = np.flatnonzero(near & (self._low[:, 2] <= place[2]) & (place[2] <= self._high[:, 2]))
         if not len(chosen):
             return np.full(len(angles_rad), math.inf)
-        directions = np.stack([np.cos(angles_rad), np.sin(angles_rad)])
+        directions = np.empty((2, len(angles_rad)))
+        np.cos(angles_rad, out=directions[0])
+        np.sin(angles_rad, out=directions[1])
         free = self._enter(off[chosen, :2], directions, chosen).min(axis=0)
         return np.where(free <= reach_m, free, math.inf)
 

@@ -33,13 +33,13 @@ class SketchScene:
     def photograph(self, view: View, pose: Pose) -> ByteArray:
         """Draw the picture: uint8 [height, width]."""
         picture = backdrop(view, *self._backdrop)
-        facets, eye = self._facets, view.eye(pose)
+        facets, eye, axes = self._facets, view.eye(pose), view.axes(pose)
         facing = facets.facing(eye)
-        (seen,) = (facing & facets.in_view(view, pose, eye)).nonzero()
+        (seen,) = (facing & facets.in_view(view, eye, axes)).nonzero()
         for group in self._far_to_near(seen, facing, eye):
             if not len(group):
                 continue
-            cover(picture, project(facets.corners.take(group, 0), view, pose, eye), int(facets.gray[group[0]]))
+            cover(picture, project(facets.corners.take(group, 0), view, eye, axes), int(facets.gray[group[0]]))
         return picture
 
     def _far_to_near(self, seen: Indices, facing: Flags, eye: Floats) -> Iterable[Indices]:
@@ -61,9 +61,9 @@ class SketchScene:
         right = ((2.0 * columns + 1.0) / view.width_px - 1.0) * wide
         up = (1.0 - (2.0 * rows + 1.0) / view.height_px) * high
         ways = np.stack(np.broadcast_arrays(right, up[:, None], 1.0)).reshape(3, -1)  # one metre along the axis each
-        eye = view.eye(pose)
-        seen = np.flatnonzero(self._facets.in_view(view, pose, eye)[self._facets.painted :])
-        boxes_m = self._prisms.distances_m(eye, view.axes(pose) @ ways, np.unique(seen // BOX_FACES))
+        eye, axes = view.eye(pose), view.axes(pose)
+        seen = np.flatnonzero(self._facets.in_view(view, eye, axes)[self._facets.painted :])
+        boxes_m = self._prisms.distances_m(eye, axes @ ways, np.unique(seen // BOX_FACES))
         return np.minimum(boxes_m.reshape(len(rows), len(columns)), floor_distances_m(view)[rows, None])
 
     def ranges_m(self, origin: tuple[float, float, float], angles_rad: Floats, reach_m: float) -> Floats:
