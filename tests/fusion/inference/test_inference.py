@@ -10,6 +10,7 @@ from nets import camera_net, fusion_net, kernel_net, lidar_net, noise
 
 from lira.fusion.inference.architecture import Architecture
 from lira.fusion.inference.build import alone, driving
+from lira.fusion.inference.networks import REMEMBERED
 from lira.fusion.inference.trunks import PictureTrunk, ScanTrunk
 from lira.fusion.policies.ensemble import EnsembleNet
 from lira.fusion.policies.kernel import KernelRidge, KernelSettings
@@ -123,13 +124,35 @@ def test_a_picture_that_changes_in_its_place_is_seen_anew():
     assert after != before
 
 
+def test_what_a_teacher_has_foreseen_is_not_computed_again(monkeypatch):
+    network, looked = fusion_net(101, 16, seed=4).driving(), []
+    features = network.features
+    monkeypatch.setattr(network, "features", lambda seen: looked.append(1) or features(seen))
+    foreseen = [network.act(noise(101, step)) for step in range(15)]
+    assert [network.act(noise(101, step)) for step in range(15)] == foreseen
+    assert len(looked) == 15
+    network.act(Features(image=noise(101, 0).image, scan=noise(101, 1).scan))
+    assert len(looked) == 16
+
+
+def test_what_is_long_ago_is_forgotten_and_all_of_it_with_other_weights():
+    network, other = (fusion_net(101, 16, seed=seed).driving() for seed in (4, 5))
+    before = [network.act(noise(101, step)) for step in range(2 * REMEMBERED)]
+    assert len(network._lately) == REMEMBERED
+    assert [network.act(noise(101, step)) for step in range(2 * REMEMBERED)] == before
+    network.load_weights(other.weights())
+    assert network.act(noise(101, 0)) == other.act(noise(101, 0)) != before[0]
+
+
 def test_threads_that_ask_at_once_do_not_disturb_each_other():
     networks = [camera_net(16, seed=4).driving() for _ in range(2)]  # with one trunk between them
-    expected = [networks[0].act(noise(101, seed)) for seed in range(4)]
+    expected = [networks[0].features(noise(101, seed)).copy() for seed in range(4)]
     wrong = []
 
     def ask(network):
-        wrong.extend(k for k in range(400) if network.act(noise(101, k % 4)) != expected[k % 4])
+        for k in range(400):
+            if not np.array_equal(network.features(noise(101, k % 4)), expected[k % 4]):
+                wrong.append(k)
 
     with ThreadPoolExecutor() as pool:
         list(pool.map(ask, networks))
