@@ -7,9 +7,9 @@ does, it does
     (1 - w(x)) g m(x) + w(x) a_1,    w(x) = 1 - k(x)^T P' k(x)
 
 so that it does not lose a line only because nobody has shown it this one. Where another has something to say and nobody
-has shown it whom to follow, it is as slow as it knows little, but turns as far as what it knows says, or creeping on it
-would still run into what it turns away from: where it knows less than half, 1 - u(x) = k(x)^T P k(x) < 1/2, its turn is
-larger by (2 (1 - u(x)))^-1/2.
+has shown it whom to follow, it is as slow as it knows little. Where that one would turn to the same side it turns as far
+as what it knows says, or creeping on it would still run into what it turns away from: if it knows less than half,
+1 - u(x) = k(x)^T P k(x) < 1/2, its turn is larger by (2 (1 - u(x)))^-1/2.
 
 Labels that say full steer to either side, before a box straight ahead or where the line is just out of view, have a
 mean that says neither. How large a turn they say, whichever side, is
@@ -56,21 +56,22 @@ class Advice(NamedTuple):
     """What the first expert says where all others are quiet; nothing, where one of them is not, or hesitates."""
 
     action: FloatArray  # a_1 [2], or zero
-    side: float  # of its turn, -1 or 1, or 0 if it does about what it does while cruising
-    hesitation: bool  # one of the others is quiet only because it has as much to say for either side
+    side: float = 0.0  # of its turn, -1 or 1, or 0 if it does about what it does while cruising
+    given: bool = False  # it says that, so all others are quiet
+    hesitation: bool = False  # one of the others is quiet only because it has as much to say for either side
+    other: float = 0.0  # the side to which the one of the others turns that turns most, if it has something to say
 
     def side_for(self, turn: float, *, sides: bool) -> float:
         """The side to turn to, -1 or 1, if labels whose mean is `turn` are undecided; 0 for none, a_1's on `sides`."""
         own = -1.0 if turn < 0.0 else 1.0
         return own if self.hesitation else self.side * sides
 
-    @property
-    def given(self) -> bool:
-        """Whether it says anything."""
-        return not (self.hesitation or self is SILENCE)
+    def agrees(self, turn: float) -> bool:
+        """Whether another expert, that has something to say, turns to the side of this turn, too."""
+        return turn * self.other > 0.0
 
 
-SILENCE = Advice(np.zeros(2, np.float32), 0.0, hesitation=False)
+SILENCE = Advice(np.zeros(2, np.float32))
 HESITATION = SILENCE._replace(hesitation=True)
 
 
@@ -110,10 +111,9 @@ class KernelNet(DrivingNet):
         if advice.given:
             w = np.float32(unknown(k, self._of_others))
             action = (np.float32(1.0) - w if self.architecture.asks else 1.0) * action + w * advice.action
-        if advice is not SILENCE:
-            side = advice.side_for(action[ANGULAR], sides=self.architecture.sides)
-            action[ANGULAR] = decided(action[ANGULAR], self._gains[ANGULAR], k @ self._squares, side)
-        if self.architecture.asks and not advice.given:
+        side = advice.side_for(action[ANGULAR], sides=self.architecture.sides)
+        action[ANGULAR] = decided(action[ANGULAR], self._gains[ANGULAR], k @ self._squares, side)
+        if self.architecture.asks and advice.agrees(action[ANGULAR]):
             action[ANGULAR] *= made_up_for(unknown(k, self._p))
         linear, angular = np.clip(action, np.float32(-1.0), np.float32(1.0)).tolist()
         return linear, angular
@@ -160,11 +160,10 @@ class KernelNet(DrivingNet):
         actions = [np.tanh(head(features[part])) for head, part in zip(self._heads, self._parts, strict=True)]
         away = np.array(actions) - self._cruises
         if np.abs(away[1:]).max(initial=0.0) >= QUIET:
-            return SILENCE
+            return SILENCE._replace(other=side_of(max(away[1:, ANGULAR].tolist(), key=abs)))
         if self.architecture.halves and self._hesitation(seen):
             return HESITATION
-        turn = float(away[0, ANGULAR])
-        return Advice(actions[0], math.copysign(1.0, turn) if abs(turn) >= QUIET else 0.0, hesitation=False)
+        return Advice(actions[0], side_of(float(away[0, ANGULAR])), given=True)
 
     def _hesitation(self, seen: Features) -> bool:
         """Whether one of the others has something to say as soon as half of its view is free."""
@@ -177,6 +176,11 @@ class KernelNet(DrivingNet):
 
     def _k(self, features: FloatArray) -> Doubles:
         return kernel(self._x, unit(features, self._parts)[None], self._parts, self._widths)[:, 0]
+
+
+def side_of(turn: float) -> float:
+    """The side of an expert's turn, -1 or 1; 0 if it has nothing to say."""
+    return math.copysign(1.0, turn) if abs(turn) >= QUIET else 0.0
 
 
 def parts(sizes: Sequence[int]) -> list[slice]:
@@ -193,7 +197,7 @@ def decided(turn: NDArray[Any], gain: float, squares: NDArray[Any], side: NDArra
 
 
 def made_up_for(unknown: NDArray[Any]) -> NDArray[Any]:
-    """How much larger the turn is where nobody is asked and so much [...] is unknown."""
+    """How much larger the turn is where so much [...] is unknown and another expert agrees with its side."""
     factor: NDArray[Any] = np.sqrt(LITTLE / np.clip(1.0 - unknown, NOTHING, LITTLE))
     return factor
 

@@ -304,7 +304,8 @@ class KernelRidge:
                 [each.side_for(turn, sides=sides) for each, turn in zip(advice, turns.tolist(), strict=True)]
             )
             turns = decided(turns, gain, k @ self.fit.squares, side)
-            actions[:, ANGULAR] = turns * np.where(given, 1.0, made_up_for(unknown(k, self.fit.p)))
+            agree = [each.agrees(turn) for each, turn in zip(advice, turns.tolist(), strict=True)]
+            actions[:, ANGULAR] = turns * np.where(agree, made_up_for(unknown(k, self.fit.p)), 1.0)
         return [(clipped(linear), clipped(angular)) for linear, angular in actions.tolist()]
 
     @property

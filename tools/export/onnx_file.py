@@ -156,7 +156,7 @@ def _kernel(graph: Graph, what: Architecture, weights: Weights, seen: Sequence[s
     turned = graph.add("Mul", [graph.cast(mean), gains])
     unknown = _unknown(graph, values, "p", p)
     if what.fallback:
-        first, side, hesitation, asked = _advice(graph, what, weights, seen)
+        first, side, hesitation, asked, other = _advice(graph, what, weights, seen)
         w = unknown
         if what.asks:
             w = _unknown(graph, values, "p_of_others", without(p, weights["others"] < 1.0))
@@ -166,7 +166,7 @@ def _kernel(graph: Graph, what: Architecture, weights: Weights, seen: Sequence[s
         squares = graph.add("MatMul", [values, graph.constant("squares", p @ weights["y"][:, ANGULAR:] ** 2)])
         turned = _decided(graph, turned, weights["gain"], squares, _side_for(graph, turned, side, hesitation))
         if what.asks:
-            turned = _made_up_for(graph, turned, unknown, asked)
+            turned = _made_up_for(graph, turned, unknown, other)
     limits = [graph.constant("low", np.float32(-1.0)), graph.constant("high", np.float32(1.0))]
     graph.add("Clip", [turned, *limits], "action")
     spread = graph.add("Sqrt", [unknown])
@@ -182,19 +182,20 @@ def _unknown(graph: Graph, values: str, name: str, p: ArrayLike) -> str:
     return graph.add("Max", [rest, graph.constant("zero", np.float64(0.0))])
 
 
-def _made_up_for(graph: Graph, action: str, unknown: str, asked: str) -> str:
-    """The action with its turn as `made_up_for` has it where nobody is asked."""
+def _made_up_for(graph: Graph, action: str, unknown: str, other: str) -> str:
+    """The action with its turn as `made_up_for` has it where another expert agrees with its side."""
     one, little = graph.constant("one", np.float64(1.0)), graph.constant("little", np.float64(LITTLE))
     known = graph.add("Max", [graph.add("Sub", [one, unknown]), graph.constant("nothing", np.float64(NOTHING))])
     factor = graph.add("Sqrt", [graph.add("Div", [little, graph.add("Min", [known, little])])])
     linear, turn = (graph.column(action, k) for k in (0, ANGULAR))
-    larger = graph.add("Mul", [turn, graph.cast(graph.add("Where", [asked, one, factor]))])
+    agrees = graph.add("Greater", [graph.add("Mul", [turn, other]), graph.constant("none", np.float32(0.0))])
+    larger = graph.add("Mul", [turn, graph.cast(graph.add("Where", [agrees, factor, one]))])
     return graph.add("Concat", [linear, larger], axis=1)
 
 
-def _advice(graph: Graph, what: Architecture, weights: Weights, seen: Sequence[str]) -> tuple[str, str, str, str]:
-    """What `Advice` says: the first expert's action and side where it is asked, whether another hesitates, and whether
-    it is asked.
+def _advice(graph: Graph, what: Architecture, weights: Weights, seen: Sequence[str]) -> tuple[str, str, str, str, str]:
+    """What `Advice` says: the first expert's action and side where it is asked, whether another hesitates, whether it
+    is asked, and how the one of the others turns that turns most, if it has something to say.
     """
     quiet, none = graph.constant("quiet", np.float32(QUIET)), graph.constant("none", np.float32(0.0))
     whole = [_away(graph, what, weights, name, x) for name, x in zip(what.shapes, seen, strict=True)]
@@ -211,7 +212,12 @@ def _advice(graph: Graph, what: Architecture, weights: Weights, seen: Sequence[s
     turn = graph.column(away, ANGULAR)
     speaks = graph.add("And", [asked, graph.add("GreaterOrEqual", [graph.add("Abs", [turn]), quiet])])
     side = graph.add("Where", [speaks, graph.add("Sign", [turn]), none]) if what.sides else none
-    return graph.add("Where", [asked, action, none]), side, hesitation, asked
+    turns = graph.add("Concat", [graph.column(away, ANGULAR) for _, away in whole[1:]], axis=1)
+    right, left = (graph.add(kind, [turns], axes=[1], keepdims=1) for kind in ("ReduceMin", "ReduceMax"))
+    most = graph.add("Where", [graph.add("Greater", [graph.add("Neg", [right]), left]), right, left])
+    loud = graph.add("GreaterOrEqual", [graph.add("Abs", [most]), quiet])
+    other = graph.add("Where", [loud, most, none])
+    return graph.add("Where", [asked, action, none]), side, hesitation, asked, other
 
 
 def _away(graph: Graph, what: Architecture, weights: Weights, feature: str, x: str) -> tuple[str, str]:

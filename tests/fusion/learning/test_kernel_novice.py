@@ -8,7 +8,7 @@ import pytest
 from nets import before, camera_net, lidar_net
 
 from lira.fusion.inference.checkpoint import Checkpoint, load_checkpoint, save_checkpoint
-from lira.fusion.inference.kernel_net import SILENCE, KernelNet, unknown
+from lira.fusion.inference.kernel_net import KernelNet, unknown
 from lira.fusion.learning import kernel_novice
 from lira.fusion.learning.kernel_novice import KernelNovice
 from lira.fusion.learning.labels import Label, mirror
@@ -167,17 +167,19 @@ def test_what_the_first_expert_taught_it_is_asked_of_that_expert_itself():
         assert taught.frozen().act(seen(77)) == pytest.approx(taught.alone(seen(77)), abs=1e-4)
 
 
-def test_where_nobody_is_asked_and_little_is_known_it_drives_slowly_and_turns_as_far_as_what_it_knows_says():
+@pytest.mark.parametrize(("turn", "agrees"), [(-0.6, True), (0.6, False)])
+def test_where_another_expert_turns_to_its_side_and_it_knows_little_it_turns_as_far_as_what_it_knows_says(turn, agrees):
     settings = KernelSettings(length=0.7, lengths=(), gain=1.0)
     learner = novice(cruises=cruises(lidar_quiet=False), mirrored=False, settings=settings)
-    learner.remember(Label(seen(0), (1.0, -0.6), "human", 1.0))
+    learner.remember(Label(seen(0), (1.0, turn), "human", 1.0))
+    assert learner.alone(seen(0)) == pytest.approx(learner.act(seen(0)))  # it knows this
     linear, angular = learner.act(seen(1))
     known = 1.0 - unknown(learner.ridge.k(learner._x(seen(1))), learner.ridge.fit.p)
     assert 0.0 < known < 0.5
-    assert learner.alone(seen(1)) == pytest.approx((linear, max(-1.0, angular * (0.5 / known) ** 0.5)))
+    larger = (0.5 / known) ** 0.5 if agrees else 1.0
+    assert learner.alone(seen(1)) == pytest.approx((linear, np.clip(angular * larger, -1.0, 1.0)))
     assert learner.frozen().act(seen(1)) == pytest.approx(learner.alone(seen(1)), abs=1e-4)
     assert before(learner.frozen(), halves=True).act(seen(1)) == pytest.approx((linear, angular), abs=1e-4)
-    assert learner.alone(seen(0)) == pytest.approx(learner.act(seen(0)))  # it knows this
 
 
 def test_where_another_expert_has_something_to_say_it_stands():
@@ -226,7 +228,8 @@ def test_an_expert_that_is_quiet_before_a_box_straight_ahead_hesitates():
     assert sees.advice(box(0)).hesitation
     assert not any(sees.advice(box(0)).action)
     for left in (-20, 20):  # there it says something
-        assert sees.advice(box(left)) is SILENCE
+        advice = sees.advice(box(left))
+        assert (advice.given, advice.hesitation, advice.other) == (False, False, 1.0 if left < 0 else -1.0)
     nothing = Features(image=box(0).image, scan=np.ones(101, np.float32))
     assert not sees.advice(nothing).hesitation
     assert any(sees.advice(nothing).action)
