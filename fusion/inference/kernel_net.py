@@ -7,8 +7,8 @@ does, it does
     (1 - w(x)) g m(x) + w(x) a_1,    w(x) = 1 - k(x)^T P' k(x)
 
 so that it does not lose a line only because nobody has shown it this one. Where another has something to say and nobody
-has shown it whom to follow, it is as slow as it knows little. Where that one would turn to the same side it turns as far
-as what it knows says, or creeping on it would still run into what it turns away from: if it knows less than half,
+has shown it whom to follow, it is as slow as it knows little. Where that one would turn to the same side, it turns as
+far as what it knows says, or creeping on it would still run into what it turns away from: if it knows less than half,
 1 - u(x) = k(x)^T P k(x) < 1/2, its turn is larger by (2 (1 - u(x)))^-1/2.
 
 Labels that say full steer to either side, before a box straight ahead or where the line is just out of view, have a
