@@ -135,7 +135,7 @@ class KernelNet(DrivingNet):
 
     def _prepare(self, weights: Weights) -> None:
         lengths, noise = weights["lengths"], weights["noise"]
-        if min(*lengths, *noise) <= 0.0:
+        if min(lengths.min(), noise.min(initial=1.0)) <= 0.0:
             raise ValueError("a kernel without width or noise")
         self._x, self._widths = weights["x"], lengths.astype(np.float64) ** 2
         self._parts = parts(self.architecture.trunk_sizes)

@@ -137,6 +137,20 @@ def test_one_that_goes_by_itself_where_an_expert_hesitates_does_the_same():
         np.testing.assert_allclose(ask(build(older, about(older)), boxes)["action"], actions, atol=CLOSE)
 
 
+@pytest.mark.parametrize("names", [("lidar",), ("camera", "lidar", "depth-table-top-depth")])
+def test_of_however_many_experts_it_does_the_same(names):
+    loaded = [load_checkpoint(PRETRAINED[0].with_name(f"thesis-sim-{name}.safetensors")) for name in names]
+    sees = KernelNet.from_experts([network for network, _ in loaded], [of.cruise for _, of in loaded])
+    shapes = sees.architecture.shapes
+    novice = KernelNovice(sees, LearningSettings(), KernelSettings(length=1.0, lengths=()), mirrored=True)
+    for k, source in enumerate(names * 2):
+        novice.remember(Label(seeing(shapes, k), (0.9, 0.7 * (-1.0) ** k), source))
+    network = novice.frozen()
+    seen = [seeing(shapes, seed) for seed in range(20)]
+    got = ask(build(network, about(network)), seen)
+    np.testing.assert_allclose(got["action"], [network.act(each) for each in seen], atol=CLOSE)
+
+
 def test_a_file_says_what_it_is_and_the_verb_writes_it(tmp_path, capsys):
     network = novice_of_plus()
     given, out = tmp_path / "novice.safetensors", tmp_path / "novice.onnx"

@@ -212,8 +212,8 @@ def _advice(graph: Graph, what: Architecture, weights: Weights, seen: Sequence[s
     turn = graph.column(away, ANGULAR)
     speaks = graph.add("And", [asked, graph.add("GreaterOrEqual", [graph.add("Abs", [turn]), quiet])])
     side = graph.add("Where", [speaks, graph.add("Sign", [turn]), none]) if what.sides else none
-    turns = graph.add("Concat", [graph.column(away, ANGULAR) for _, away in whole[1:]], axis=1)
-    right, left = (graph.add(kind, [turns], axes=[1], keepdims=1) for kind in ("ReduceMin", "ReduceMax"))
+    turns = [graph.column(away, ANGULAR) for _, away in whole[1:]]
+    right, left = (graph.add(kind, [none, *turns]) for kind in ("Min", "Max"))
     most = graph.add("Where", [graph.add("Greater", [graph.add("Neg", [right]), left]), right, left])
     loud = graph.add("GreaterOrEqual", [graph.add("Abs", [most]), quiet])
     other = graph.add("Where", [loud, most, none])
