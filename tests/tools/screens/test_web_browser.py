@@ -8,7 +8,7 @@ import time
 import pytest
 from web_bed import Applied, browser, descendants, needs_browser, page_of_robot, wait_until
 
-from lira.hal.messages import Source
+from lira.hal.messages import HELD, Source
 
 pytest.importorskip("aiohttp", reason="needs aiohttp: pip install 'lira-rosbot[web]'")
 selenium = pytest.importorskip("selenium", reason="needs selenium: pip install 'lira-rosbot[dev]'")
@@ -91,6 +91,20 @@ def drives(page, hold, steer, let_go, applied, what):
     raise AssertionError(f"{what}; {says}")
 
 
+def hands_back(drive, let_go, applied):
+    """The hand drives and lets go, and the policy drives on. On a busy machine that one may have paused meanwhile.
+
+    What stopped is held, until a hand has driven again.
+    """
+    for _ in range(4):
+        drive()
+        let_go()
+        with contextlib.suppress(AssertionError):
+            return wait_until(lambda: applied.listen()[-1].source is Source.POLICY, 5.0)
+        assert applied.all[-1].reason in HELD, f"control did not go back to the policy: {applied.all[-1]}"
+    raise AssertionError("the policy was held each time")
+
+
 def keys(driver, applied):
     hold, steer = (ActionChains(driver).key_down(key).perform for key in (Keys.SPACE, Keys.ARROW_UP))
     let_go = ActionChains(driver).key_up(Keys.SPACE).key_up(Keys.ARROW_UP).perform
@@ -112,11 +126,12 @@ def touch(driver, kind, touched):
 
 
 def test_keys_drive_and_let_go(page, applied):
+    def drive():
+        keys(page, applied)
+        assert wait_until(lambda: who(page) == "YOU DRIVE")
+
     sit(page)
-    keys(page, applied)
-    assert wait_until(lambda: who(page) == "YOU DRIVE")
-    ActionChains(page).key_up(Keys.SPACE).key_up(Keys.ARROW_UP).perform()
-    wait_until(lambda: applied.listen()[-1].source is Source.POLICY, what="control did not go back to the policy")
+    hands_back(drive, ActionChains(page).key_up(Keys.SPACE).key_up(Keys.ARROW_UP).perform, applied)
 
 
 def test_two_thumbs_drive_and_lifted_let_go(page, applied):
@@ -130,9 +145,7 @@ def test_two_thumbs_drive_and_lifted_let_go(page, applied):
         touch(page, "touchEnd", [])
 
     sit(page)
-    drives(page, hold, steer, let_go, applied, "thumbs do not drive")
-    let_go()
-    wait_until(lambda: applied.listen()[-1].source is Source.POLICY, what="control did not go back to the policy")
+    hands_back(lambda: drives(page, hold, steer, let_go, applied, "thumbs do not drive"), let_go, applied)
 
 
 def test_a_pad_in_the_browser_drives_and_its_loss_stops(page, applied):
