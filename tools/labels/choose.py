@@ -57,9 +57,10 @@ def fitting(labels: Sequence[Demonstration], wanted: Wanted) -> list[int]:
 
 
 def fits(label: Demonstration, wanted: Wanted) -> bool:
-    """Whether a label is of the source, the time and the run that is meant."""
-    begins = wanted.from_s is None or label.stamp_s >= wanted.from_s - 1e-6
-    ends = wanted.to_s is None or label.stamp_s <= wanted.to_s + 1e-6
+    """Whether a label is of the source, the time (to the digit, or as `when` prints it) and the run that is meant."""
+    times = label.stamp_s, round(label.stamp_s, 1)
+    begins = wanted.from_s is None or max(times) >= wanted.from_s - 1e-6
+    ends = wanted.to_s is None or min(times) <= wanted.to_s + 1e-6
     of_run = wanted.run is None or label.run == wanted.run
     return begins and ends and of_run and wanted.source in (None, label.source)
 

@@ -71,7 +71,8 @@ def rewrite(log: Path) -> str:
         return f"{path} still knows them; it is learned anew when teaching goes on: lira fusion --method NAME --run DIR"
     _, about = load_checkpoint(path)
     network = novice.frozen()
-    save_checkpoint(path, network, replace(about, labels=len(learned), examples=network.architecture.examples))
+    now = network.architecture
+    save_checkpoint(path, network, replace(about, labels=len(learned), examples=now.examples, sides=now.sides))
     return f"{path} was learned anew from {plural(len(learned), 'label')}; it has not been proven since"
 
 

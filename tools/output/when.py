@@ -10,7 +10,8 @@ def when(stamp_s: float) -> str:
     """Return the time of day here, or seconds."""
     if stamp_s < COUNTS_FROM_1970_S:
         return f"{stamp_s:.1f} s"
-    return f"{datetime.fromtimestamp(stamp_s, UTC).astimezone():%Y-%m-%d %H:%M:%S}.{int(stamp_s * 10) % 10}"
+    time = datetime.fromtimestamp(round(stamp_s, 1), UTC).astimezone()
+    return f"{time:%Y-%m-%d %H:%M:%S}.{round(time.microsecond / 1e5)}"
 
 
 def stamp(text: str) -> float:

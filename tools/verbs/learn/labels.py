@@ -53,11 +53,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--from",
         type=stamp,
         dest="from_s",
-        metavar="S",
-        help="list, undo, redo: from this time of the robot's clock on",
+        metavar="TIME",
+        help="list, undo, redo: from this time of the robot's clock on, in seconds or as list prints it",
     )
-    add("--to", type=stamp, dest="to_s", metavar="S", help="list, undo, redo: up to this time")
-    add("--time", type=stamp, metavar="S", help="explain: the label that is nearest to this time")
+    add("--to", type=stamp, dest="to_s", metavar="TIME", help="list, undo, redo: up to this time")
+    add("--time", type=stamp, metavar="TIME", help="explain: the label that is nearest to this time")
     add("--run", type=int, metavar="R", help="of this run in the log (default: the last that fits; list: all)")
     add("-o", "--output", type=Path, metavar="FILE", help="merge: the new log")
     add(

@@ -76,7 +76,7 @@ def test_the_folder_of_a_run_stands_for_its_log(folder, tmp_path, capsys):
     assert f"{empty / LABELS}" in said.err
 
 
-@pytest.mark.parametrize("began_s", [5.0, 1.79e9])
+@pytest.mark.parametrize("began_s", [5.0, 5.04, 1.79e9, 1.79e9 + 0.07])
 def test_a_label_has_the_same_time_wherever_it_is_named(folder, capsys, began_s):
     (folder / LABELS).unlink()
     with DemonstrationLog(folder / LABELS, SIM, mirrored=True) as log:
@@ -87,6 +87,8 @@ def test_a_label_has_the_same_time_wherever_it_is_named(folder, capsys, began_s)
     assert f": 6 (camera, lap 1, {time}: turn -0.90, the others" in contradiction_words([aside])
     assert time in lira(capsys, "list", folder)[1].out.splitlines()[-4]
     assert f"label 6 (run 0, lap 1, {time})" in lira(capsys, "explain", folder, "--time", time)[1].out
+    said = lira(capsys, "list", folder, "--from", time, "--to", time, "--json", "-")[1].out
+    assert [row["number"] for row in json.loads(said)["labels"]] == [6]
 
 
 def test_a_time_that_is_none_is_refused(folder, capsys):
@@ -132,6 +134,14 @@ def test_the_last_intervention_is_taken_back_and_the_novice_knows_it_no_more(fol
     status, said = lira(capsys, "redo", folder / LABELS)
     assert said.out.splitlines()[0] == "learned again: 3 labels 7-9"
     assert turn(folder, 0) == pytest.approx(before, abs=1e-3)
+
+
+def test_a_novice_that_is_learned_anew_takes_sides_as_the_labels_that_are_left_say(folder, capsys):
+    network, about = load_checkpoint(folder / NOVICE)
+    save_checkpoint(folder / NOVICE, network, replace(about, sides=True))
+    lira(capsys, "undo", folder)
+    assert not relearn(folder / LABELS)[0].takes_sides
+    assert not load_checkpoint(folder / NOVICE)[1].sides
 
 
 PROVEN = ResultRecord(True, 1, 5, 0, 2, 3, 10, 10, 60.0, 6.0, proof="fresh:3")
