@@ -2,7 +2,16 @@ import math
 
 import pytest
 
-from lira.fusion.log.run_log import LapRecord, Pose, ResultRecord, RunRecord, RunWriter, StepRecord, read_run
+from lira.fusion.log.run_log import (
+    ContradictionRecord,
+    LapRecord,
+    Pose,
+    ResultRecord,
+    RunRecord,
+    RunWriter,
+    StepRecord,
+    read_run,
+)
 from lira.hal.errors import StorageError
 from lira.hal.messages import CourseState, Decision, ExpertView, LabelCounts
 
@@ -33,6 +42,16 @@ def test_what_is_written_is_read_back(path):
     assert list(read_run(path)) == RECORDS
     assert Pose.of(STATE).progress_m is None
     assert Pose.of(STATE).clearance_m is None
+
+
+def test_a_contradiction_of_before_whose_time_was_into_its_lap_is_read_without_a_time(path):
+    aside = (
+        b'{"number":6,"source":"human","lap":1,"stamp_s":5.4,"action":[1.0,0.5],"others":[0.9,-0.7],"mirrored":true}'
+    )
+    lines = path.read_bytes().replace(b'"contradictions":[]', b'"contradictions":[' + aside + b"]")
+    path.write_bytes(lines)
+    *_, result = read_run(path)
+    assert result.contradictions == (ContradictionRecord(6, "human", 1, (1.0, 0.5), (0.9, -0.7), mirrored=True),)
 
 
 def test_a_second_writer_goes_on_behind_the_first(path):
