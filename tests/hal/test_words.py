@@ -8,7 +8,7 @@ import pytest
 from lira.hal.words import plural
 
 ROOT = Path(__file__).parents[2]
-COUNTED = "labels|laps|layouts|trials|runs|steps|calls|interventions|messages|episodes|decisions|days"
+COUNTED = "labels|laps|layouts|trials|runs|steps|calls|interventions|messages|episodes|decisions|days|stops"
 UNASKED = re.compile(rf"(?<!of )(?<!these )\{{[^{{}}:]+\}} (?:[a-z]+ )?(?:{COUNTED})\b")
 
 

@@ -141,7 +141,7 @@ def deployed(summary: Summary) -> list[Row]:
     for row in chain.from_iterable(rows_of(summary, "Deployed")):
         words = f"{cell(row['unseen_passed'])} of {cell(row['unseen_laps'])}, {cell(row['collisions'])}"
         if row["stops"]:
-            words += f", {row['stops']} stops"
+            words += f", {plural(int(str(row['stops'])), 'stop')}"
         found.setdefault(row["method"], {"method": row["method"]})[cell(row["deployed"])] = words
     return list(found.values())
 
