@@ -9,7 +9,7 @@ does, it does
 so that it does not lose a line only because nobody has shown it this one. Where another has something to say and nobody
 has shown it whom to follow, it is as slow as it knows little. Where that one would turn to the same side, it turns as
 far as what it knows says, or creeping on it would still run into what it turns away from: if it knows less than half,
-1 - u(x) = k(x)^T P k(x) < 1/2, its turn is larger by (2 (1 - u(x)))^-1/2.
+1 - u(x) = k(x)^T P k(x) < 1/2, its turn is larger by the factor (2 (1 - u(x)))^-1/2.
 
 Labels that say full steer to either side, before a box straight ahead or where the line is just out of view, have a
 mean that says neither. How large a turn they say, whichever side, is
@@ -42,7 +42,7 @@ from lira.hal.messages import Action, FloatArray
 
 QUIET = 0.2  # an expert less than this away from its cruise action has nothing to say, as with `hold` of LIRA-SPF
 LITTLE = 0.5  # it knows less than half: its turn is made up for
-NOTHING = 1e-3  # it knows no more than this: there is no turn to make up for
+NOTHING = 1e-3  # where it knows less than this its turn is made up for as if it were this: it fades
 UNDECIDED = 0.2  # so much larger a turn to either side than their mean: labels are not of one mind
 NEVER = 1e9  # a limit that no deviation comes to; a file holds finite numbers
 _LEAST_LENGTH = np.float32(1e-12)  # a trunk that sees nothing stays zero instead of becoming nan
@@ -53,7 +53,10 @@ Doubles = NDArray[np.float64]
 
 
 class Advice(NamedTuple):
-    """What the first expert says where all others are quiet; nothing, where one of them is not, or hesitates."""
+    """What the first expert says where all others are quiet; nothing, where one of them hesitates, or is not.
+
+    Of one that is not, the side to which it turns.
+    """
 
     action: FloatArray  # a_1 [2], or zero
     side: float = 0.0  # of its turn, -1 or 1, or 0 if it does about what it does while cruising
@@ -81,7 +84,8 @@ class KernelNet(DrivingNet):
     Its weights are the trunks' and, for n examples, `x` [n, size], `y` [n, 2] and `noise` [n], a length scale for each
     trunk, the deviations s [2] and the gain g [1], all as in `policies/kernel.py`; and the `limit` [1], the largest
     deviation of a turn in the runs that proved it. One that falls back also has its experts' last layers and their
-    `cruise` actions [experts, 2]; `others` [n] is 1 for an example that the first of them did not give, else 0.
+    `cruise` actions [experts, 2]; one that asks the first of them has `others` [n], 1 for an example that this one did
+    not give, else 0.
     """
 
     @classmethod
