@@ -9,7 +9,7 @@ used by then. The folder also gets a page (NAME.html) and the drawings.
 
 examples:
   lira experiment unseen --seeds 10 --workers 2
-  lira experiment unseen --seeds 10 --first-seed 360 --pairs line@37,line@38,line@39 --methods kernel
+  lira experiment unseen --seeds 10 --first-seed 362 --pairs line@37,line@38,line@39 --methods kernel
   lira experiment unseen --seeds 10 --methods plus --shift gray
   lira experiment table2 --seeds 10 --workers 2 --methods hold,hg-dagger    # all: every method
   lira experiment race --seeds 10 --scheduler tcp://192.168.1.5:8786 --json race.json
