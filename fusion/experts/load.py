@@ -37,7 +37,7 @@ def load_network(name_or_path: str, profile: RobotProfile, pair: str = DEFAULT) 
         inputs = " and ".join(profile.features.inputs)
         what = f"{path} was trained for '{checkpoint.profile}' and needs its {' and '.join(unseen)}"
         what += f"; a robot of the profile '{profile.name}' learns from {inputs} alone"
-        raise ConfigError(what, who_has(unseen))
+        raise ConfigError(what, who_has([MODALITIES[name].sensor for name in checkpoint.features]))
     if any(own.get(name) != shape for name, shape in seen.items()):
         raise ConfigError(
             f"{path} was trained for '{checkpoint.profile}' ({_sizes(seen)}), not for '{profile.name}' ({_sizes(own)})",

@@ -139,11 +139,12 @@ class KernelNovice(Novice):
         # In pairs: a trunk remembers what it saw last.
         looks = [(self._x(each), self._network.advice(each)) for each in seen]
         x = np.array([each for each, _ in looks])
-        advice = [each for _, each in looks] if self._network.architecture.fallback else None
+        what = self._network.architecture
+        advice = [each for _, each in looks] if what.fallback else None
         likeness = self.ridge.k(x if len(seen) > 1 else x[0]).reshape(len(seen), -1)
         if proving:
             self._meet(likeness)
-        return self.ridge.actions(likeness, self.ridge.gain, advice, sides=self.takes_sides)
+        return self.ridge.actions(likeness, self.ridge.gain, advice, sides=self.takes_sides, asks=what.asks)
 
     def _meet(self, k: Doubles) -> None:
         """Keep the kernel values [m, n] of states of a proving run."""

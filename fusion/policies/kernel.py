@@ -288,23 +288,30 @@ class KernelRidge:
         return action
 
     def actions(
-        self, k: Doubles, gain: float = 1.0, advice: Sequence[Advice] | None = None, *, sides: bool = False
+        self,
+        k: Doubles,
+        gain: float = 1.0,
+        advice: Sequence[Advice] | None = None,
+        *,
+        sides: bool = False,
+        asks: bool = True,
     ) -> list[tuple[float, float]]:
         """The same of several states, of which these are the kernel values [m, n].
 
-        With the first expert's `advice` for each as `inference/kernel_net.py` tells, also on `sides`.
+        With the first expert's `advice` for each as `inference/kernel_net.py` tells, also on `sides`; `asks` is False
+        for a novice that was proven before it asked that expert for what that one taught it.
         """
         actions = self.fit.mean(k) * (1.0, gain)
         if advice is not None:
             given = np.array([each.given for each in advice])
-            w = np.where(given, unknown(k, self.fit.of_others), 0.0)[:, None]
-            actions = (1.0 - w) * actions + w * np.array([each.action for each in advice])
+            w = np.where(given, unknown(k, self.fit.of_others if asks else self.fit.p), 0.0)[:, None]
+            actions = (1.0 - w * asks) * actions + w * np.array([each.action for each in advice])
             turns = actions[:, ANGULAR]
             side = np.array(
                 [each.side_for(turn, sides=sides) for each, turn in zip(advice, turns.tolist(), strict=True)]
             )
             turns = decided(turns, gain, k @ self.fit.squares, side)
-            agree = [each.agrees(turn) for each, turn in zip(advice, turns.tolist(), strict=True)]
+            agree = [asks and each.agrees(turn) for each, turn in zip(advice, turns.tolist(), strict=True)]
             actions[:, ANGULAR] = turns * np.where(agree, made_up_for(unknown(k, self.fit.p)), 1.0)
         return [(clipped(linear), clipped(angular)) for linear, angular in actions.tolist()]
 

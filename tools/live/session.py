@@ -182,4 +182,8 @@ class LiveSession:
                 self._driver.service.change_method(self._classroom.method)
             if self.board.stage in TAUGHT:
                 self._driver.asked = Request.UNDO  # the lap begins anew, with who has unlearned
+            elif self._proof:  # it was of a novice that knew more
+                self.converged, self._proof = False, []
+                since = f"{self.words}; since then labels were taken back, and what is left has not been proven"
+                self.board.note_verdict(since, converged=False)
         return done, words

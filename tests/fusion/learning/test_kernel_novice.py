@@ -159,6 +159,10 @@ def test_what_the_first_expert_taught_it_is_asked_of_that_expert_itself():
     assert learner.alone(seen(77)) == pytest.approx(first)
     assert learner.frozen().act(seen(77)) == pytest.approx(first, abs=1e-4)
     assert before(learner.frozen(), halves=True).act(seen(77)) == pytest.approx((0.9, -0.9), abs=0.03)
+    older = KernelNovice(before(learner.frozen(), halves=True), LearningSettings(), KernelSettings(), mirrored=False)
+    for _ in range(20):
+        older.remember(Label(seen(77), (0.9, -0.9), "camera"))
+    assert older.alone(seen(77)) == pytest.approx((0.9, -0.9), abs=0.03)  # a log of before, relearned
     for source in ("lidar", "mean", "human"):  # somebody else says no
         taught = novice(cruises=cruises(lidar_quiet=True), mirrored=False)
         for _ in range(20):

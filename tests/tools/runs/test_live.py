@@ -2,6 +2,7 @@
 
 import dataclasses
 import time
+from types import SimpleNamespace
 
 import pytest
 from msgspec import structs
@@ -196,6 +197,24 @@ def test_who_fails_where_it_was_taught_has_not_passed_and_the_verdict_says_why()
     assert verdict_words(helped).endswith("(you took over: 1)")
     assert "were not tried" in verdict_words([lap(Phase.PROVE)])
     assert judged_words(2, 3).startswith("It drove 2 of 3 times as you wanted; 95 %")
+
+
+def test_labels_that_are_taken_back_after_the_verdict_make_it_void():
+    board = Board("ada", Before(), Ledger(), lambda: 1.0, lambda _: None, lambda _: None)
+    driver = SimpleNamespace(board=board, service=None, asked=None)
+    novice = SimpleNamespace(trained=True)
+    room = SimpleNamespace(
+        undo=lambda _: (True, "not learned any more"), before=Before(), method=SimpleNamespace(novice=novice)
+    )
+    session = LiveSession(driver, None, room, SimpleNamespace(ledger=Ledger()), Rules(), lambda _: None)
+    session._proof, session.converged = [lap(Phase.PROVE)], True
+    board.note_verdict("It drove 1 of 1 time as you wanted", converged=True)
+    board.show(Stage.VERDICT, 0)
+    for _ in range(2):  # it is said once
+        assert session.take(OperatorRequest(Request.UNDO)) == (True, "not learned any more")
+    assert not session.converged
+    since = "since then labels were taken back, and what is left has not been proven"
+    assert session.words == f"It drove 1 of 1 time as you wanted; {since}"
 
 
 def test_the_board_counts_laps_and_tells_a_new_stage_at_once():
