@@ -17,7 +17,7 @@ from lira.fusion.inference.trunks import Trunk, trunk_with
 from lira.fusion.preprocess import Features
 from lira.hal.messages import Action, FloatArray
 
-REMEMBERED = 32  # actions: twice as many as the steps that a teacher looks ahead at 10 Hz
+REMEMBERED = 64  # actions: twice as many as the steps that any teacher looks ahead
 
 
 class DrivingNet(ABC):
@@ -82,12 +82,13 @@ class LayeredNet(DrivingNet):
     def act(self, seen: Features) -> Action:
         """Return the action for one step, in [-1, 1]^2."""
         what = b"".join([seen[name].tobytes() for name in self._trunks])
-        if what not in self._lately:
-            if len(self._lately) == REMEMBERED:
-                del self._lately[next(iter(self._lately))]  # the oldest
+        action = self._lately.get(what)
+        if action is None:
             linear, angular = self.head(self.features(seen)).tolist()
-            self._lately[what] = linear, angular
-        return self._lately[what]
+            if len(self._lately) >= REMEMBERED:
+                self._lately.clear()  # at once, which no other thread can see half done
+            action = self._lately[what] = linear, angular
+        return action
 
     def head(self, features: FloatArray) -> FloatArray:
         """The layers behind the trunks: what those have made [size] -> the action [2]."""
