@@ -14,7 +14,7 @@ from lira.fusion.preprocess import Features, Shape
 from lira.tools.bench import Row
 
 RUNS = 15
-DECISIONS = 100  # in a run
+DECISIONS = 100  # in a run: more than a network remembers, so that each is made
 BINS = {16: 101, 32: 130}  # by filters: the simulated and the real robot
 TRUNKS = ("shared", "own")  # whether the novice sees with its experts' trunks
 
