@@ -200,9 +200,9 @@ def decided(turn: NDArray[Any], gain: float, squares: NDArray[Any], side: NDArra
     return np.where(undecided, side * size, turn)
 
 
-def made_up_for(unknown: NDArray[Any]) -> NDArray[Any]:
-    """How much larger the turn is where so much [...] is unknown and another expert agrees with its side."""
-    factor: NDArray[Any] = np.sqrt(LITTLE / np.clip(1.0 - unknown, NOTHING, LITTLE))
+def made_up_for(share: NDArray[Any]) -> NDArray[Any]:
+    """How much larger the turn is where that share [...] is unknown and another expert agrees with its side."""
+    factor: NDArray[Any] = np.sqrt(LITTLE / np.clip(1.0 - share, NOTHING, LITTLE))
     return factor
 
 

@@ -86,16 +86,22 @@ def test_a_name_that_can_be_no_module_is_refused(tmp_path, capsys, name):
     assert not (tmp_path / "there").exists()
 
 
+def assert_taken(tmp_path, capsys, kind, name, words):
+    """It is refused with these words, another name is proposed, and nothing is made."""
+    assert main(["new", kind, name, "--into", str(tmp_path / "there")]) == 2
+    what, remedy = capsys.readouterr().err.splitlines()
+    assert what == f"lira new: there is a {words}"
+    assert f"such as my-{name}" in remedy
+    assert not (tmp_path / "there").exists()
+
+
 @pytest.mark.parametrize("kind", KINDS)
 @pytest.mark.parametrize(
     "name", ["json", "lira", "numpy", "torch", "zenoh", "cv2", "ruamel", "hypothesis", "eclipse-zenoh"]
 )
 def test_a_name_that_would_hide_what_is_installed_is_refused(tmp_path, capsys, kind, name):
-    assert main(["new", kind, name, "--into", str(tmp_path / "there")]) == 2
-    what, remedy = capsys.readouterr().err.splitlines()
-    assert what == f"lira new: there is a module or a package '{name}' already, which yours would hide"
-    assert f"such as my-{name}" in remedy
-    assert not (tmp_path / "there").exists()
+    words = f"module or a package '{name}' already, which yours would hide"
+    assert_taken(tmp_path, capsys, kind, name, words)
 
 
 def test_what_is_not_installed_but_would_be_used_is_refused_too(tmp_path, capsys, monkeypatch):
@@ -119,11 +125,7 @@ def test_what_is_not_installed_but_would_be_used_is_refused_too(tmp_path, capsys
     ],
 )
 def test_a_name_of_the_projects_own_is_refused(tmp_path, capsys, kind, name):
-    assert main(["new", kind, name, "--into", str(tmp_path / "there")]) == 2
-    what, remedy = capsys.readouterr().err.splitlines()
-    assert what == f"lira new: there is a {kind} '{name}' already, which comes with the project"
-    assert f"such as my-{name}" in remedy
-    assert not (tmp_path / "there").exists()
+    assert_taken(tmp_path, capsys, kind, name, f"{kind} '{name}' already, which comes with the project")
 
 
 def test_another_kind_may_have_that_name(project):
